@@ -22,6 +22,7 @@ MAPS = (
     ('scenes', 'Cavities', '', 'scene', '"cavities"', 'CavityFill', 'body/body_def.h'),
     ('materials', 'Keys', '', 'material_yaml', 'what', 'Material', 'dynamics/material.h'),
     ('materials', 'Curves and plasticity', '', 'material_yaml', '"plasticity"', 'Plasticity', 'dynamics/material.h'),
+    ('materials', 'Fibres', '', 'material_yaml', '"fibres"', 'Fibres', 'dynamics/material.h'),
     ('materials', 'How tissue looks', '', 'material_yaml', '"outer"', 'Look', 'appearance/look.h'),
     ('materials', 'How tissue looks', '', 'material_yaml', '"inner"', 'Look', 'appearance/look.h'),
     ('tasks', 'Keys', '', 'task', '"the task"', 'TaskDef', 'training/task.h'),

@@ -9,6 +9,7 @@
 #include "meshless_surgery/body/deform.h"
 #include "meshless_surgery/body/filled_cells.h"
 #include "meshless_surgery/geometry/lattice/cell_regions.h"
+#include "meshless_surgery/geometry/lattice/fibre_directions.h"
 #include "meshless_surgery/geometry/mesh/measures.h"
 
 namespace meshless {
@@ -62,6 +63,14 @@ ElasticParameters ownElasticity(const BodyModel& model, const Material& material
   ElasticParameters own =
       elasticParameters(factor * model.specific_stiffness * material.density, model.poissons_ratio, material.density);
   if (material.elastic()) own.stiffening = material.stiffening, own.asymmetry = material.asymmetry;
+  own.fibres = factor * model.specific_fibres * material.density;
+  own.fibre_stiffening = material.fibres.stiffening;
+  return own;
+}
+
+ElasticParameters specificElasticity(const BodyModel& model) {
+  ElasticParameters own = elasticParameters(model.specific_stiffness, model.poissons_ratio, 1.0);
+  own.fibres = model.specific_fibres;
   return own;
 }
 
@@ -112,19 +121,25 @@ void makeTissue(BodyModel& model, const Material& material) {
     if (!material.elastic() && material.mode == MatchMode::kQuadratic)
       addQuadraticRest(model.rest, model.match_masses, model.clusters, model.shape);
   }
+  model.specific_fibres = material.hasFibres() && model.lattice ? material.fibres.stiffness / material.density : 0.0;
+  if (model.specific_fibres > 0.0 && model.fibres.empty())
+    model.fibres = fibreDirections(*model.lattice, model.fibre_direction);
   const ElasticParameters own = elasticityOf(material, model.length);
   model.specific_stiffness = own.youngs / own.density;
   model.poissons_ratio = material.elastic() ? material.poissons_ratio : kCarryingPoisson;
   if (!material.elastic() && (!model.lattice || standsOnItsGoal(model, material))) return;
   makeElastic(model);
   model.highest_frequency =
-      model.cells ? highestFrequency(*model.cells, own) : highestFrequency(matchInput(model), model.elastic, own);
+      model.cells ? highestFrequency(*model.cells, specificElasticity(model))
+                  : highestFrequency(matchInput(model), model.elastic, own);
 }
 
 BodyModelPtr withMaterial(const BodyModelPtr& model, const Material& before, const Material& after) {
   const bool new_masses = before.density != after.density;
   const bool new_elasticity = before.youngs_modulus != after.youngs_modulus ||
-                              (after.elastic() && before.poissons_ratio != after.poissons_ratio);
+                              (after.elastic() && before.poissons_ratio != after.poissons_ratio) ||
+                              before.hasFibres() != after.hasFibres() ||
+                              (after.hasFibres() && before.fibres.stiffness != after.fibres.stiffness);
   const bool needs_quadratic =
       !after.elastic() && after.mode == MatchMode::kQuadratic && model->shape.quadratic.empty();
   const bool other_support = standsOnItsGoal(*model, before) != standsOnItsGoal(*model, after);
@@ -153,6 +168,10 @@ BodyState restState(const BodyModel& model, const Pose& placed) {
   pose.rotation = placed.rotation;
   state.poses.assign(model.clusters.size(), pose);
   state.cells.assign(model.lattice ? model.lattice->cells.size() : 0, pose);
+  if (model.isPrestretched()) {
+    state.plastic_cells.assign(state.cells.size(), model.unstressed);
+    state.stretch = model.unstressed.stiffening;
+  }
   updateSurface(model, state);
   return state;
 }

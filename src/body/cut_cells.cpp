@@ -762,6 +762,7 @@ class CellCutter {
              inheritClamp(*child, renumbered);
              for (const double m : child->masses) child->mass += m;
              for (const Index c : cell_of) {
+               if (!model_.fibres.empty()) child->fibres.push_back(model_.fibres[cut_.parent_cell[c]]);
                piece.state.cells.push_back(state_.cells[cut_.parent_cell[c]]);
                if (!state_.plastic_cells.empty())
                  piece.state.plastic_cells.push_back(state_.plastic_cells[cut_.parent_cell[c]]);
@@ -855,8 +856,7 @@ class CellCutter {
   void inheritTissue(BodyModel& child, BodyPiece& piece) const {
     makeClamp(child);
     makeElastic(child);
-    child.highest_frequency =
-        highestFrequency(*child.cells, elasticParameters(child.specific_stiffness, child.poissons_ratio, 1.0));
+    child.highest_frequency = highestFrequency(*child.cells, specificElasticity(child));
     child.match_masses = child.masses;
     if (model_.clusters.size() == 0) return;
     for (std::size_t i = 0; i < child.fixed.size(); ++i) {

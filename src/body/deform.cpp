@@ -244,16 +244,17 @@ void stress(Substep& s) {
   } else {
     s.state.relaxed.clear();
   }
-  if (model.cells && (s.material.plastic() || !s.state.plastic_cells.empty())) {
+  if (model.cells && s.material.plastic()) {
     s.state.stretch = elasticAccelerations(*model.cells, parameters, y, poses, s.pull(), s.counters, s.state.swelling,
                                            &s.state.plastic_cells, relaxed);
-  } else if (s.material.plastic() || !s.state.plastic.empty()) {
+  } else if (!model.cells && (s.material.plastic() || !s.state.plastic.empty())) {
     s.state.stretch =
         elasticAccelerations(input, model.elastic, parameters, y, poses, s.pull(), s.counters, s.state.swelling);
   } else {
     if (!s.scratch.under_way) {
       model.elastic_batch->setRotations(poses, s.scratch.elastic);
       model.elastic_batch->setRelaxed(s.state.relaxed, parameters.relaxation.branches, s.scratch.elastic);
+      model.elastic_batch->setUnstressed(s.state.plastic_cells, s.scratch.elastic);
     }
     s.state.stretch = model.elastic_batch->accelerate(input, parameters, y, s.scratch.elastic, s.pull(), s.counters,
                                                       s.state.swelling, widestInstructionSet(), s.for_each);

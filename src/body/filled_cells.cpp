@@ -128,9 +128,11 @@ ElasticCells elasticCellsOf(const BodyModel& model) {
   ElasticCells elastic;
   elastic.half_edge = 0.5 * lattice.spacing;
   elastic.masses = model.masses;
-  for (const LatticeCell& cell : lattice.cells)
+  for (const LatticeCell& cell : lattice.cells) {
+    const Vec3 fibre = model.specific_fibres > 0.0 ? model.fibres[elastic.cells.size()] : Vec3(Vec3::Zero());
     elastic.cells.push_back({cell.corners, model.cell_mass * cell.stiffness_share * cell.resists.fraction,
-                             centroidOf(cell.resists), varianceOf(cell.resists), mixOf(model, cell)});
+                             centroidOf(cell.resists), varianceOf(cell.resists), mixOf(model, cell), fibre});
+  }
   return elastic;
 }
 

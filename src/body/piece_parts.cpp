@@ -12,6 +12,9 @@ std::shared_ptr<BodyModel> beginPiece(const BodyModel& parent, const TriangleMes
   piece->solid = true;
   piece->spacing = parent.spacing;
   piece->own = parent.own;
+  piece->unstressed = parent.unstressed;
+  piece->fibre_direction = parent.fibre_direction;
+  piece->specific_fibres = parent.specific_fibres;
   piece->grouping = parent.grouping;
   piece->length = parent.length;
   piece->specific_stiffness = parent.specific_stiffness;

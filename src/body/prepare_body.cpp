@@ -11,6 +11,7 @@
 #include "meshless_surgery/body/cavities.h"
 #include "meshless_surgery/body/cell_blend.h"
 #include "meshless_surgery/body/filled_cells.h"
+#include "meshless_surgery/dynamics/plastic.h"
 #include "meshless_surgery/geometry/lattice/cell_regions.h"
 #include "meshless_surgery/geometry/mesh/even_surface.h"
 #include "meshless_surgery/geometry/mesh/main_axes.h"
@@ -47,6 +48,8 @@ constexpr double kLongestEdge = 1.5;   // of the spacing: the surface bends as f
 Error invalid(const std::string& what) { return {ErrorCode::kInvalidArgument, what}; }
 
 bool finite(const Vec3& v) { return v.allFinite(); }
+
+bool isPrestretched(const BodyDef& def) { return def.prestretch != Vec3::Ones(); }
 
 Status validate(const BodyDef& def) {
   if (def.mesh.empty()) return Error{ErrorCode::kUnsuitableShape, "body '" + def.name + "' has no triangles"};
@@ -94,6 +97,25 @@ Status validate(const BodyDef& def) {
     return invalid("body '" + def.name + "' has regions; accepted: those of a closed body of an elastic material");
   if (const Status valid = def.cavities.validate(); !valid)
     return invalid("body '" + def.name + "': " + valid.error().detail);
+  if (!((def.prestretch.array() >= 0.25).all() && (def.prestretch.array() <= 4.0).all() &&
+        std::abs(def.prestretch.prod() - 1.0) < 1e-9)) {
+    std::ostringstream text;
+    text << "prestretch of body '" << def.name << "' is [" << def.prestretch.x() << ", " << def.prestretch.y() << ", "
+         << def.prestretch.z() << "]; accepted: factors of 0.25 to 4 that keep the volume";
+    return invalid(text.str());
+  }
+  if (!(def.fibre_direction.isZero(0.0) || std::abs(def.fibre_direction.norm() - 1.0) < 1e-9))
+    return invalid("fibre_direction of body '" + def.name + "' is no direction; accepted: a unit vector, or none");
+  if (def.material.hasFibres() && !def.solid)
+    return invalid("body '" + def.name + "' has fibres, of its material '" + def.material.name +
+                   "'; accepted: closed bodies");
+  if (isPrestretched(def) && !(def.solid && def.material.elastic()))
+    return invalid("body '" + def.name +
+                   "' has a prestretch; accepted: that of a closed body of an elastic material, with a youngs_modulus");
+  if (isPrestretched(def) && def.material.plastic())
+    return invalid("body '" + def.name +
+                   "' has a prestretch, and plasticity, which would take it for flow; accepted: "
+                   "one of them");
   return def.material.validate();
 }
 
@@ -311,8 +333,8 @@ void holdParticles(const std::vector<HeldRegion>& regions, const Pose& pose, Bod
     if (inside(model.rest[i])) model.fixed[i] = model.any_fixed = true;
 }
 
-// Which entry of `fixed` holds what, and the middle of it: of the border at which free tissue ends, or where it has none
-// of what is held.
+// Which entry of `fixed` holds what, and the middle of it: of the border at which free tissue ends, or where it has
+// none of what is held.
 void findHolders(const BodyDef& def, const Pose& placed, const Pose& pose, BodyModel& model) {
   const std::size_t count = def.fixed.size();
   std::vector<HeldHeight> heights;
@@ -541,6 +563,9 @@ Result<PreparedBody> prepared(BodyDef def) {
     for (Vec3& v : surface.vertices) v = axes.transpose() * v;
     placed = {pose.rotation * Quat(axes), pose.translation};
     model->own.rotation = Quat(axes);
+    model->fibre_direction = axes.transpose() * def.fibre_direction;
+    const Vec3 logarithm = -def.prestretch.array().log();
+    if (isPrestretched(def)) model->unstressed = plasticShape(axes.transpose() * logarithm.asDiagonal() * axes);
   } else {
     model->own = {pose.rotation.conjugate(), pose.rotation.conjugate() * -pose.translation};
     for (Vec3& v : surface.vertices) v = pose * v;

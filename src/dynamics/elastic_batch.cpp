@@ -71,6 +71,8 @@ ElasticBatch::ElasticBatch(const ElasticCells& body) {
   cells_.assign((blocks_ - whole_blocks_) * kBlock * elastic_sets::kCellRows, 0.0);
   if (std::any_of(body.cells.begin(), body.cells.end(), [](const ElasticCell& cell) { return !cell.mix.isOwn(); }))
     mixes_.assign((blocks_ - whole_blocks_) * kBlock * elastic_sets::kMixRows, 0.0);
+  if (std::any_of(body.cells.begin(), body.cells.end(), [](const ElasticCell& cell) { return !cell.fibre.isZero(0.0); }))
+    fibres_.assign(blocks_ * 3 * kBlock, 0.0);
   const auto add = [&](const std::vector<Index>& cells, std::size_t first) {
     for (std::size_t n = 0; n < (cells.size() + kBlock - 1) / kBlock * kBlock; ++n) {
       const std::size_t block = first + n / kBlock, i = n % kBlock;
@@ -78,6 +80,8 @@ ElasticBatch::ElasticBatch(const ElasticCells& body) {
       const ElasticCell& cell = body.cells[c];
       if (n < cells.size()) clusters_[block * kBlock + i] = c;
       masses_[block * kBlock + i] = cell.mass;
+      for (int axis = 0; axis < 3 && !fibres_.empty(); ++axis)
+        fibres_[(block * 3 + static_cast<std::size_t>(axis)) * kBlock + i] = cell.fibre[axis];
       for (int k = 0; k < kCorners; ++k) particles_[(block * kCorners + k) * kBlock + i] = cell.corners[k];
       if (block < whole_blocks_) continue;
       double* const rows = cells_.data() + (block - whole_blocks_) * kBlock * elastic_sets::kCellRows + i;
@@ -203,6 +207,20 @@ void ElasticBatch::getRelaxed(const ElasticBatchState& state, std::vector<Relaxe
             state.relaxed[(lane / kBlock * rows + row) * kBlock + lane % kBlock];
 }
 
+void ElasticBatch::setUnstressed(const std::vector<PlasticShape>& shapes, ElasticBatchState& state) const {
+  state.unstressed.clear();
+  if (shapes.empty()) return;
+  state.unstressed.assign(blocks_ * elastic_sets::kUnstressedRows * kBlock, 0.0);
+  for (std::size_t lane = 0; lane < clusters_.size(); ++lane) {
+    if (clusters_[lane] == kNoIndex) continue;
+    const PlasticShape& shape = shapes[clusters_[lane]];
+    const Mat3& s = shape.inverse;
+    const double rows[] = {s(0, 0), s(0, 1), s(0, 2), s(1, 1), s(1, 2), s(2, 2), shape.stiffening * shape.stiffening};
+    for (int row = 0; row < elastic_sets::kUnstressedRows; ++row)
+      state.unstressed[(lane / kBlock * elastic_sets::kUnstressedRows + row) * kBlock + lane % kBlock] = rows[row];
+  }
+}
+
 void ElasticBatch::sumForces(std::size_t first, std::size_t last, const double* forces, Points& accelerations) const {
   for (std::size_t i = first; i < last; ++i) {
     double x = 0.0, y = 0.0, z = 0.0;
@@ -241,6 +259,11 @@ double ElasticBatch::accelerate(const MatchInput& in, const ElasticParameters& m
       block.cells = cells_.data() + (index - whole_blocks_) * kBlock * elastic_sets::kCellRows;
     if (!whole && !mixes_.empty())
       block.mixes = mixes_.data() + (index - whole_blocks_) * kBlock * elastic_sets::kMixRows;
+    if (!fibres_.empty()) {
+      block.fibres = fibres_.data() + index * 3 * kBlock;
+      block.fibre = material.fibres / material.density;
+      block.fibre_stiffening = material.fibre_stiffening;
+    }
     block.half_edge = half_edge_;
     block.shrink = 1.0 / swelling;
     block.shear = 2.0 * material.mu / material.density;
@@ -258,6 +281,8 @@ double ElasticBatch::accelerate(const MatchInput& in, const ElasticParameters& m
       block.relaxed = state.relaxed.data() + index * elastic_sets::kStrainRows *
                                                  static_cast<std::size_t>(material.relaxation.branches) * kBlock;
     }
+    if (!state.unstressed.empty())
+      block.unstressed = state.unstressed.data() + index * elastic_sets::kUnstressedRows * kBlock;
     block.rotations = state.rotations.data() + index * 4 * kBlock;
     block.forces = state.forces.data() + index * 3 * kCorners * kBlock;
     const elastic_sets::BlockResult result = accelerateBlock(block, set);
@@ -287,7 +312,7 @@ double ElasticBatch::accelerate(const MatchInput& in, const ElasticParameters& m
 }
 
 std::size_t ElasticBatch::bytes() const {
-  return sizeof *this + bytesOf(clusters_, particles_, masses_, shapes_, cells_, mixes_) +
+  return sizeof *this + bytesOf(clusters_, particles_, masses_, shapes_, cells_, mixes_, fibres_) +
          bytesOf(force_offsets_, force_places_, inverse_masses_) +
          bytesOf(others_.offsets, others_.members, others_.weights) +
          bytesOf(other_clusters_, other_shape_.clusters, other_shape_.quadratic, other_elastic_);

@@ -27,6 +27,7 @@ constexpr int kModes[4] = {3, 5, 6, 7};  // by the bits of their coordinates
 // Between the two passes over a block.
 struct alignas(64) Fits {
   double gradient[9][kBlock];  // F, row by row
+  double strained[9][kBlock];  // likewise, from the shape without stress where that is another
   double centre[3][kBlock];    // less the first corner
   double pending[kBlock];      // 1: no rotation was found yet
 };
@@ -116,8 +117,8 @@ MESHLESS_INLINE Matrix fitCell(const Block& b, int i) {
   return f;
 }
 
-MESHLESS_INLINE Matrix timesInverse(const Matrix& a, const double* shape) {
-  const double* const s = shape + kInverseRow * kBlock;
+// Times a symmetric matrix: rows xx xy xz yy yz zz.
+MESHLESS_INLINE Matrix timesSymmetric(const Matrix& a, const double* s) {
   const Pack xx = get(s), xy = get(s + kBlock), xz = get(s + 2 * kBlock), yy = get(s + 3 * kBlock);
   const Pack yz = get(s + 4 * kBlock), zz = get(s + 5 * kBlock);
   Matrix f;
@@ -146,7 +147,7 @@ MESHLESS_INLINE Matrix fitAny(const Block& b, Fits& fits, int i) {
     }
   }
   for (int axis = 0; axis < 3; ++axis) put(centre[axis], fits.centre[axis] + i);
-  return timesInverse(a, shape);
+  return timesSymmetric(a, shape + kInverseRow * kBlock);
 }
 
 // Newton's method on the rotation vector from the last rotation (Kugelstadt et al. 2018), until it verifies itself: a
@@ -209,8 +210,9 @@ std::size_t rotateCold(const Block& b, const Fits& fits) {
   }
   if (count == 0) return 0;
   double matrices[9][kBlock], quaternions[4][kBlock];
+  const auto& turned = b.unstressed ? fits.strained : fits.gradient;
   for (int n = 0; n < count; ++n) {
-    for (int k = 0; k < 9; ++k) matrices[k][n] = fits.gradient[k][index[n]];
+    for (int k = 0; k < 9; ++k) matrices[k][n] = turned[k][index[n]];
     for (int k = 0; k < 4; ++k) quaternions[k][n] = b.rotations[k * kBlock + index[n]];
   }
   RotationBatch<double> batch;
@@ -366,6 +368,26 @@ MESHLESS_INLINE Matrix relax(const Block& b, const Matrix& f, const Matrix& r, i
   return by_f;
 }
 
+// pullFibres() of elastic_law.h over density.
+MESHLESS_INLINE void pullFibres(const Block& b, const Matrix& f, int i, Matrix& p, Pack& steepness) {
+  const Pack a[3] = {get(b.fibres + i), get(b.fibres + kBlock + i), get(b.fibres + 2 * kBlock + i)};
+  Pack drawn[3], length2 = {};
+  for (int row = 0; row < 3; ++row) {
+    drawn[row] = f.m[row][0] * a[0] + f.m[row][1] * a[1] + f.m[row][2] * a[2];
+    length2 += drawn[row] * drawn[row];
+  }
+  const Pack length = squareRoot(length2), longer = length - 1.0;
+  const Mask pulls = longer > 0.0;
+  const Pack q = longer * longer, grown = 1.0 / (1.0 + (b.fibre_stiffening / (kMostStiffening - 1.0)) * q);
+  const Pack slope = 1.0 + b.fibre_stiffening * (q * grown);
+  const Pack stiffness = b.mixes ? b.fibre * get(b.mixes + kOwnRow * kBlock + i) : all(b.fibre);
+  const Pack pull = choose(pulls, stiffness * longer * slope / length, Pack{});
+  for (int row = 0; row < 3; ++row)
+    for (int c = 0; c < 3; ++c) p.m[row][c] += pull * drawn[row] * a[c];
+  const Pack steep = 3.0 * (slope + 2.0 * b.fibre_stiffening * (q * (grown * grown)));
+  steepness = choose(pulls & (steep > steepness), steep, steepness);
+}
+
 // Stress over density, and the steepness, as stress() of elastic_law.h.
 template <bool kStiffens>
 MESHLESS_INLINE Matrix stress(const Block& b, const Matrix& gradient, const Lame& lame, int i, Pack& steepness) {
@@ -412,6 +434,7 @@ MESHLESS_INLINE Matrix stress(const Block& b, const Matrix& gradient, const Lame
     for (int row = 0; row < 3; ++row)
       for (int c = 0; c < 3; ++c) p.m[row][c] -= lame.shear * taken.m[row][c];
   }
+  if (b.fibres) pullFibres(b, f, i, p, steepness);
   return p;
 }
 
@@ -420,7 +443,7 @@ MESHLESS_INLINE void pushAny(const Block& b, const Fits& fits, const Matrix& f, 
   const double* const shape = b.shape + i;
   const Pack mass = get(b.masses + i);
   const Pack k = b.hourglass * get(shape + kSoftnessRow * kBlock);
-  Matrix pull = timesInverse(p, shape);
+  Matrix pull = timesSymmetric(p, shape + kInverseRow * kBlock);
   Pack middle[3];
   for (int axis = 0; axis < 3; ++axis) {
     for (int c = 0; c < 3; ++c) pull.m[axis][c] -= k * f.m[axis][c];
@@ -548,6 +571,10 @@ MESHLESS_INLINE BlockResult accelerateOf(const Block& b) {
     else
       f = fitCell<kKind == Kind::kWhole>(b, i);
     putMatrix(f, fits.gradient, i);
+    if (b.unstressed) {
+      f = timesSymmetric(f, b.unstressed + i);
+      putMatrix(f, fits.strained, i);
+    }
     rotate(b, f, fits, i);
   }
   result.cold = rotateCold(b, fits);
@@ -556,7 +583,11 @@ MESHLESS_INLINE BlockResult accelerateOf(const Block& b) {
     const Matrix f = matrixAt(fits.gradient, i);
     const Lame lame = lameOf(b, i);
     Pack steepness;
-    Matrix p = stress<kStiffens>(b, f, lame, i, steepness);
+    Matrix p = stress<kStiffens>(b, b.unstressed ? matrixAt(fits.strained, i) : f, lame, i, steepness);
+    if (b.unstressed) {
+      p = timesSymmetric(p, b.unstressed + i);
+      steepness *= get(b.unstressed + kSteeperRow * kBlock + i);
+    }
     if (i + kLanes > b.count)  // what only fills up has no rotation of its own
       for (int l = b.count - i; l < kLanes; ++l) steepness[l] = 0.0;
     most = steepness > most ? steepness : most;

@@ -35,6 +35,11 @@ constexpr int kMixRows = kAsymmetryRow + 1;
 
 constexpr int kStrainRows = 6;  // in Block::relaxed, of a branch: xx yy zz xy yz zx
 
+// Rows of kBlock values in Block::unstressed.
+constexpr int kUnstressedRow = 0;                // PlasticShape::inverse: xx xy xz yy yz zz
+constexpr int kSteeperRow = kUnstressedRow + 6;  // the square of its stiffening
+constexpr int kUnstressedRows = kSteeperRow + 1;
+
 /// Clusters of at most eight members that span space, by their `shape`; or, where that is null, cubes of one size,
 /// their corners in the order of the bits of x, y, z: filled in part as `cells` says, or whole and of the body's
 /// material where that is null too. Lanes from count to kBlock repeat a cluster.
@@ -46,6 +51,10 @@ struct Block {
   const double* shape = nullptr;             // [kShapeRows][kBlock]
   const double* cells = nullptr;             // [kCellRows][kBlock]
   const double* mixes = nullptr;             // [kMixRows][kBlock]; null where all is of the body's material
+  const double* unstressed = nullptr;        // [kUnstressedRows][kBlock] of cubes; null: they are at rest without stress
+  const double* fibres = nullptr;            // [3][kBlock] of cubes: x y z of their direction; null: there are none
+  double fibre = 0.0;                        // their stiffness over rho
+  double fibre_stiffening = 0.0;
   double half_edge = 1.0;                    // [m] of the cubes
   double shrink = 1.0;                       // strain is that of F times this
   double shear = 0.0;                        // 2 mu / rho

@@ -118,6 +118,7 @@ double elasticAccelerations(const ElasticCells& body, const ElasticParameters& m
     RelaxedStrain* const taken = relaxed ? &(*relaxed)[c] : nullptr;
     if (taken) elastic_law::takeOn(mixed.relaxation, elastic_law::deviatorOf(f.strained, f.rotation), *taken);
     Mat3 by_gradient = elastic_law::stress(mixed, f.strained, f.rotation, steepness, taken);
+    elastic_law::pullFibres(mixed, f.strained, cell.fibre, by_gradient, steepness);
     if (shape) {
       by_gradient *= shape->inverse;
       steepness *= shape->stiffening * shape->stiffening;
@@ -162,9 +163,10 @@ double elasticEnergy(const ElasticCells& body, const ElasticParameters& material
     // By F, not F / swelling: the factor is the derivative's.
     const ElasticParameters mixed = cell.mix.of(material);
     const double volume = cell.mass / mixed.density;
-    energy += volume * (swelling * elastic_law::energyDensity(mixed, f.strained, f.rotation,
-                                                              relaxed ? &(*relaxed)[c] : nullptr) +
-                        bendingOf(body, cell, mixed, poses[c].deformation, f.coefficients).energy);
+    const double density =
+        elastic_law::energyDensity(mixed, f.strained, f.rotation, relaxed ? &(*relaxed)[c] : nullptr) +
+        elastic_law::fibreEnergy(mixed, f.strained, cell.fibre);
+    energy += volume * (swelling * density + bendingOf(body, cell, mixed, poses[c].deformation, f.coefficients).energy);
   }
   return energy;
 }
@@ -179,8 +181,9 @@ std::vector<Mat3> cellStresses(const ElasticCells& body, const ElasticParameters
     const PlasticShape* const shape = shapeOf(plastic, c);
     const Fit f = fit(body, cell, y, swelling, shape, poses[c], uncounted);
     double unused = 0.0;
-    stresses.push_back(
-        elastic_law::stress(cell.mix.of(material), f.strained, f.rotation, unused, relaxed ? &(*relaxed)[c] : nullptr));
+    const ElasticParameters mixed = cell.mix.of(material);
+    stresses.push_back(elastic_law::stress(mixed, f.strained, f.rotation, unused, relaxed ? &(*relaxed)[c] : nullptr));
+    elastic_law::pullFibres(mixed, f.strained, cell.fibre, stresses.back(), unused);
     if (shape) stresses.back() *= shape->inverse;
   }
   return stresses;
@@ -194,7 +197,8 @@ double highestFrequency(const ElasticCells& body, const ElasticParameters& mater
       const Coefficients a = coefficientsOf(cell, displacements, Vec3::Zero());
       const Mat3 g = gradientOf(a, body.half_edge);
       const ElasticParameters mixed = cell.mix.of(material);
-      const Mat3 by_gradient = mixed.mu * (g + g.transpose()) + mixed.lambda * g.trace() * Mat3::Identity();
+      const Mat3 by_gradient = mixed.mu * (g + g.transpose()) + mixed.lambda * g.trace() * Mat3::Identity() +
+                               mixed.fibres * cell.fibre.dot(g * cell.fibre) * cell.fibre * cell.fibre.transpose();
       elastic_law::Bending bending = bendingOf(body, cell, mixed, Mat3::Identity(), a);
       bending.by_gradient.setZero();  // of the second order
       addForces(cell, slopes(body, cell, mixed, by_gradient, bending), forces);

@@ -46,6 +46,18 @@ inline HeldVolume heldVolume(const Mat3& f) {
   return held;
 }
 
+// W(q) that begins as q and whose slope W' grows with `by` q, to kMostStiffening at most.
+struct Stiffened {
+  double energy, slope;  // W, W'
+  double growth;         // W''
+};
+inline Stiffened stiffened(double by, double q) {
+  const double rate = by / (kMostStiffening - 1.0), z = rate * q, grown = 1.0 / (1.0 + z);
+  // The integral of W', by its series where the closed form cancels.
+  const double excess = z < 1e-3 ? z * z * (0.5 - z * (1.0 / 3.0 - z * (0.25 - 0.2 * z))) : z - std::log1p(z);
+  return {q + (rate > 0.0 ? (kMostStiffening - 1.0) * excess / rate : 0.0), 1.0 + by * q * grown, by * grown * grown};
+}
+
 // What shear and stretch cost without change of volume: over mu.
 struct Distortion {
   double energy = 0.0;
@@ -61,19 +73,13 @@ inline Distortion distortion(const ElasticParameters& material, const Mat3& f, c
   const double level = 1.0 / (1.0 + a * a * m / kLevel), u = std::sqrt(level), fourth = kFourth * a * a * m * level;
   const double q = m + trace * trace / 3.0 - a * c * u + fourth * m;
   const double by_m = 1.0 + 0.5 * a * c * u * level * a * a / kLevel + fourth * (1.0 + level), by_c = -a * u;
-  const double grown = 1.0 / (1.0 + material.stiffening * q / (kMostStiffening - 1.0));
-  const double steep = 1.0 + material.stiffening * q * grown;
+  const Stiffened w = stiffened(material.stiffening, q);
   const Mat3 by_f = (2.0 / 3.0 * trace - by_c * m) * rotation + 2.0 * by_m * d + 3.0 * by_c * square;
   Distortion result;
-  result.slope = steep * by_f;
+  result.slope = w.slope * by_f;
   const double x = a * a * m;
-  result.curvature = steep * (2.0 + (kCurved - 2.0) * x / (kCurvedFrom + x)) +
-                     material.stiffening * grown * grown * by_f.squaredNorm();
-  const double rate = material.stiffening / (kMostStiffening - 1.0);
-  // The integral of W', by its series where the closed form cancels.
-  const double z = rate * q;
-  const double excess = z < 1e-3 ? z * z * (0.5 - z * (1.0 / 3.0 - z * (0.25 - 0.2 * z))) : z - std::log1p(z);
-  result.energy = q + (rate > 0.0 ? (kMostStiffening - 1.0) * excess / rate : 0.0);
+  result.curvature = w.slope * (2.0 + (kCurved - 2.0) * x / (kCurvedFrom + x)) + w.growth * by_f.squaredNorm();
+  result.energy = w.energy;
   return result;
 }
 
@@ -162,6 +168,22 @@ inline double energyDensity(const ElasticParameters& material, const Mat3& f, co
     }
   }
   return material.mu * distorted + material.lambda * volumeEnergy(heldVolume(f).j);
+}
+
+// Fibres along a unit vector `along` at rest: k / 2 W((|F a| - 1)^2) where they are longer than at rest. Their slope by
+// F is added to the stress, and to `steepness` what they may have grown steeper by than at rest.
+inline void pullFibres(const ElasticParameters& material, const Mat3& f, const Vec3& along, Mat3& stress,
+                       double& steepness) {
+  const Vec3 drawn = f * along;
+  const double length = drawn.norm(), longer = length - 1.0;
+  if (!(longer > 0.0)) return;
+  const Stiffened w = stiffened(material.fibre_stiffening, longer * longer);
+  stress += material.fibres * longer * w.slope / length * drawn * along.transpose();
+  steepness = std::max(steepness, 3.0 * (w.slope + 2.0 * longer * longer * w.growth));
+}
+inline double fibreEnergy(const ElasticParameters& material, const Mat3& f, const Vec3& along) {
+  const double longer = std::max(0.0, (f * along).norm() - 1.0);
+  return 0.5 * material.fibres * stiffened(material.fibre_stiffening, longer * longer).energy;
 }
 
 // Of a cell: how its energy per volume changes with the coefficients of the products of two or three coordinates, each

@@ -76,6 +76,10 @@ Status Material::validate() const {
     return outOfRange("poissons_ratio", poissons_ratio, "0 to 0.49");
   if (!(stiffening >= 0.0 && stiffening <= 1000.0)) return outOfRange("stiffening", stiffening, "0 (none) to 1000");
   if (!(asymmetry >= -30.0 && asymmetry <= 30.0)) return outOfRange("asymmetry", asymmetry, "-30 to 30");
+  if (!(fibres.stiffness >= 0.0 && fibres.stiffness <= 1e12))
+    return outOfRange("stiffness of fibres", fibres.stiffness, "0 (none) to 1e12 Pa");
+  if (!(fibres.stiffening >= 0.0 && fibres.stiffening <= 1000.0))
+    return outOfRange("stiffening of fibres", fibres.stiffening, "0 (none) to 1000");
   if (!(alpha >= 0.0 && alpha <= 1.0)) return outOfRange("alpha", alpha, "0 to 1");
   if (!(beta >= 0.0 && beta <= 1.0)) return outOfRange("beta", beta, "0 to 1");
   if (!(density > 0.0 && density <= 1e6)) return outOfRange("density", density, "above 0 to 1e6 kg/m^3");

@@ -7,7 +7,8 @@
 
 namespace meshless {
 
-Result<LoadedShape> loadShape(const std::string& real_path, double scale, MeshRepair repair, const std::string& space) {
+Result<LoadedShape> loadShape(const std::string& real_path, double scale, MeshRepair repair, const std::string& space,
+                              bool y_up) {
   if (!(scale > 0.0) || !std::isfinite(scale)) {
     std::ostringstream text;
     text << "scale is " << scale << "; accepted: above 0, finite";
@@ -23,6 +24,8 @@ Result<LoadedShape> loadShape(const std::string& real_path, double scale, MeshRe
   const bool turned = !space.empty() && !shape.space.empty() && space != shape.space;
   if (turned)
     for (Vec3& p : mesh.vertices) p = Vec3(-p.x(), -p.y(), p.z());
+  if (y_up)
+    for (Vec3& p : mesh.vertices) p = Vec3(p.x(), -p.z(), p.y());
   if (!shape.space.empty())
     shape.notes.push_back(name + ": its coordinates are in " + shape.space + (turned ? ", turned to " + space : ""));
   if (!texture.corners.empty()) {

@@ -91,6 +91,23 @@ void readRelaxation(YamlMap& map, std::vector<Relaxation>& relaxation) {
   }
 }
 
+void readFibres(YamlMap& map, Fibres& fibres) {
+  const YAML::Node node = map.get("fibres");
+  if (!node.IsDefined()) return;
+  if (node.IsNull() || (node.IsScalar() && node.Scalar() == "none")) {
+    fibres = Fibres();
+    return;
+  }
+  if (!node.IsMap()) {
+    map.source().fail(node, "fibres is " + shown(node), "{stiffness: Pa, stiffening: } or none");
+    return;
+  }
+  YamlMap inner(map.source(), node, "fibres");
+  inner.number("stiffness", {0.0, 1e12, false, "Pa"}, fibres.stiffness);
+  inner.number("stiffening", {0.0, 1000.0}, fibres.stiffening);
+  inner.finish();
+}
+
 void readNoise(YamlMap& map, Look& look) {
   std::string wanted;
   map.text("noise", wanted);
@@ -201,6 +218,7 @@ void readMaterial(YamlSource& source, const YAML::Node& node, const std::string&
   readCurve(map, "area", material.area);
   readPlasticity(map, material.plasticity);
   readRelaxation(map, material.relaxation);
+  readFibres(map, material.fibres);
   readColor(map, "color", material.color);
   readColor(map, "inside_color", material.inside_color);
   readAppearance(map, images, material.appearance);
@@ -285,13 +303,14 @@ Result<Material> changeMaterial(const Material& base, const std::string& yaml, I
   warnings.insert(warnings.end(), source.warnings.begin(), source.warnings.end());
   const bool elastic = changed.elastic();
   const std::vector<std::string> of_looks = {"alpha", "beta", "mode"},
-                                 of_elastic = {"poissons_ratio", "stiffening", "asymmetry", "relaxation"};
+                                 of_elastic = {"poissons_ratio", "stiffening", "asymmetry", "relaxation",
+                                               "fibres"};
   for (const std::string& key : elastic ? of_looks : of_elastic)
     if (const YAML::Node node = (*root)[key]; node.IsDefined())
       source.fail(node,
                   key + " is " + shown(node) + ", which " + (elastic ? "an elastic" : "an appearance") +
                       " material like '" + changed.name + "' does not use",
-                  elastic ? "youngs_modulus, poissons_ratio, stiffening, asymmetry, relaxation and what both kinds have"
+                  elastic ? "youngs_modulus, poissons_ratio, stiffening, asymmetry, relaxation, fibres and what both kinds have"
                           : "alpha, beta, mode and what both kinds have");
   if (source.fault) return *source.fault;
   return changed;

@@ -247,6 +247,52 @@ double readUnits(YamlMap& map) {
   return chosen < 0 ? 1.0 : kLengthUnits[static_cast<std::size_t>(chosen)].second;
 }
 
+bool readUpAxis(YamlMap& map) { return map.choice("up_axis", {"z", "y"}) == 1; }
+
+/// Factors along the body's own axes; those that are left out keep the volume.
+Vec3 readPrestretch(YamlSource& source, const YAML::Node& node) {
+  const std::string accepted = "factors of 0.5 to 2 along one or two of x, y and z, such as {x: 1.1}; the rest follows";
+  if (!node.IsMap()) {
+    source.fail(node, "prestretch is " + shown(node), accepted);
+    return Vec3::Ones();
+  }
+  YamlMap map(source, node, "prestretch");
+  Vec3 factors = Vec3::Zero();
+  int given = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    const std::string key(1, "xyz"[axis]);
+    map.number(key, {0.5, 2.0}, factors[axis]);
+    given += map.has(key);
+  }
+  map.finish();
+  if (given == 0 || given == 3)
+    source.fail(node, given == 0 ? "prestretch is empty" : "prestretch says all of x, y and z", accepted);
+  if (source.fault) return Vec3::Ones();
+  double product = 1.0;
+  for (const double factor : factors)
+    if (factor > 0.0) product *= factor;
+  const double rest = std::pow(product, -1.0 / (3 - given));
+  for (double& factor : factors)
+    if (!(factor > 0.0)) factor = rest;
+  return factors;
+}
+
+/// A unit vector; zero: along the body.
+Vec3 readDirection(YamlSource& source, const YAML::Node& node) {
+  Vec3 direction = Vec3::Zero();
+  if (node.IsScalar() && node.Scalar() == "along") return direction;
+  const std::string accepted = "along, or [x, y, z] in the body's own frame, of any length but 0";
+  if (!node.IsSequence() || node.size() != 3) {
+    source.fail(node, "fibre_direction is " + shown(node), accepted);
+    return direction;
+  }
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    readNumber(source, node[axis], "fibre_direction[" + std::to_string(axis) + "]", {-1e6, 1e6},
+               direction[static_cast<Eigen::Index>(axis)]);
+  if (!source.fault && !(direction.norm() > 1e-12)) source.fail(node, "fibre_direction is " + shown(node), accepted);
+  return source.fault ? Vec3(Vec3::Zero()) : Vec3(direction.normalized());
+}
+
 /// Without its name.
 InstrumentDef readInstrument(YamlSource& source, const YAML::Node& node) {
   InstrumentDef def;
@@ -340,7 +386,12 @@ class SceneReader {
     if (const YAML::Node fixed = map.get("fixed"); fixed.IsDefined()) def.fixed = readFixed(source_, fixed);
     if (const YAML::Node cavities = map.get("cavities"); cavities.IsDefined())
       def.cavities = readCavities(source_, cavities);
-    if (const YAML::Node regions = map.get("regions"); regions.IsDefined()) readRegions(regions, scale, def);
+    if (const YAML::Node prestretch = map.get("prestretch"); prestretch.IsDefined())
+      def.prestretch = readPrestretch(source_, prestretch);
+    if (const YAML::Node direction = map.get("fibre_direction"); direction.IsDefined())
+      def.fibre_direction = readDirection(source_, direction);
+    const bool y_up = readUpAxis(map);
+    if (const YAML::Node regions = map.get("regions"); regions.IsDefined()) readRegions(regions, scale, y_up, def);
     std::vector<Pose> poses{def.pose};
     const YAML::Node copies = map.get("copies");
     if (copies.IsDefined()) poses = readCopies(source_, copies, def.pose);
@@ -349,13 +400,12 @@ class SceneReader {
       source_.fail(node, file.IsDefined() ? "a body has file and primitive" : "a body has no file and no primitive",
                    "one of them");
     if (file.IsDefined() && edge > 0.0) source_.fail(map.get("edge"), "edge of a body from a file", "with a primitive");
-    if (primitive.IsDefined() && map.has("repair"))
-      source_.fail(map.get("repair"), "repair of a primitive", "with a file");
+    refuseOfPrimitive(map);
     map.finish();
     if (source_.fault) return;
 
     if (file.IsDefined())
-      loadFile(file, scale, repair, def);
+      loadFile(file, scale, repair, y_up, def);
     else
       makePrimitive(primitive, scale, edge, def);
     if (source_.fault) return;
@@ -390,12 +440,12 @@ class SceneReader {
       source_.fail(node,
                    file.IsDefined() ? "an obstacle has file and primitive" : "an obstacle has no file and no primitive",
                    "one of them");
-    if (primitive.IsDefined() && map.has("repair"))
-      source_.fail(map.get("repair"), "repair of a primitive", "with a file");
+    refuseOfPrimitive(map);
+    const bool y_up = readUpAxis(map);
     map.finish();
     if (source_.fault) return;
     if (file.IsDefined())
-      loadFile(file, scale, repair, shape);
+      loadFile(file, scale, repair, y_up, shape);
     else
       makePrimitive(primitive, scale, edge, shape);
     if (source_.fault) return;
@@ -507,7 +557,13 @@ class SceneReader {
     return chosen < 0 ? MeshRepair::kMend : static_cast<MeshRepair>(chosen);
   }
 
-  void readRegions(const YAML::Node& node, double scale, BodyDef& def) {
+  void refuseOfPrimitive(YamlMap& map) {
+    if (!map.has("primitive")) return;
+    for (const char* key : {"repair", "up_axis"})
+      if (map.has(key)) source_.fail(map.get(key), std::string(key) + " of a primitive", "with a file");
+  }
+
+  void readRegions(const YAML::Node& node, double scale, bool y_up, BodyDef& def) {
     const std::string accepted = "{box: {min, max}}, {sphere: {centre, radius}} or {file: PATH}, and material: NAME";
     if (!node.IsSequence() || node.size() > 100)
       return source_.fail(node, "regions is " + shown(node), "a list of up to 100 of " + accepted);
@@ -527,11 +583,14 @@ class SceneReader {
       if (sphere.IsDefined()) region.region = readSphere(source_, sphere);
       if (file.IsDefined() && !source_.fault) {
         BodyDef shape;
-        loadFile(file, scale, MeshRepair::kMend, shape);
+        loadFile(file, scale, MeshRepair::kMend, y_up, shape);
         if (!source_.fault && !shape.solid) source_.fail(file, "the surface of a region is open", "closed surfaces");
         if (!source_.fault) region.region = Region::within(shape.mesh, shown(file));
       }
       if (source_.fault) return;
+      if (region.material.hasFibres())
+        source_.warn(material,
+                     "the fibres of a region's material are not used: only tissue of the body's own has some");
       if (region.material.relaxes())
         source_.warn(material,
                      "the relaxation of a region's material is not used: all of a body relaxes as the body's "
@@ -540,15 +599,15 @@ class SceneReader {
     }
   }
 
-  void loadFile(const YAML::Node& node, double scale, MeshRepair repair, BodyDef& def) {
+  void loadFile(const YAML::Node& node, double scale, MeshRepair repair, bool y_up, BodyDef& def) {
     std::string path;
     if (!readText(source_, node, "file", path)) return;
     const Result<std::string> real = access_.resolve(path, folder_);
     if (!real) return source_.fail(node, real.error().detail, "", real.error().code);
-    const auto key = std::make_tuple(*real, scale, repair);
+    const auto key = std::make_tuple(*real, scale, repair, y_up);
     auto found = shapes_.find(key);
     if (found == shapes_.end()) {
-      Result<LoadedShape> loaded = loadShape(*real, scale, repair, space_);
+      Result<LoadedShape> loaded = loadShape(*real, scale, repair, space_, y_up);
       if (!loaded) return source_.fail(node, loaded.error().detail, "", loaded.error().code);
       const std::string file = fs::path(*real).filename().string();
       if (space_.empty() && !loaded->space.empty()) {
@@ -608,7 +667,7 @@ class SceneReader {
   std::set<std::string> names_;
   std::string space_;                         // to which files are turned
   std::string first_space_, first_of_space_;  // of the first file that says one, and its name
-  std::map<std::tuple<std::string, double, MeshRepair>, LoadedShape>
+  std::map<std::tuple<std::string, double, MeshRepair, bool>, LoadedShape>
       shapes_;  // copies and repeated files are read once
 };
 

@@ -377,6 +377,10 @@ std::string faultOf(const BodyModel& m) {
           !(cell.resists.variance.minCoeff() > 0.0))
         return "a cell resists with nothing";
     if (std::string fault = faultOfRegions(m); !fault.empty()) return fault;
+    if (!(m.specific_fibres >= 0.0 && m.specific_fibres < 1e50) ||
+        (m.fibres.size() != cells.size() && !(m.fibres.empty() && m.specific_fibres == 0.0)) ||
+        !std::all_of(m.fibres.begin(), m.fibres.end(), [](const Vec3& a) { return std::abs(a.norm() - 1.0) < 1e-6; }))
+      return "a body's fibres are not those of its cells";
     double boxes = 1.0;  // tables of all places are made
     for (int k = 0; k < 3; ++k) {
       const auto [low, high] =

@@ -11,7 +11,7 @@
 
 namespace meshless {
 
-constexpr std::uint32_t kStateVersion = 30;
+constexpr std::uint32_t kStateVersion = 31;
 
 inline std::uint32_t checksum(std::string_view bytes) {
   return static_cast<std::uint32_t>(
@@ -49,6 +49,7 @@ MESHLESS_ARCHIVE(Color, r, g, b, a)
 MESHLESS_ARCHIVE(TriangleMesh, vertices, triangles, patches)
 MESHLESS_ARCHIVE(ResponseCurve, points)
 MESHLESS_ARCHIVE(Relaxation, share, time)
+MESHLESS_ARCHIVE(Fibres, stiffness, stiffening)
 MESHLESS_ARCHIVE(Plasticity, yield, creep, maximum)
 /// What many share, a file has once, where it comes first: write() and read() are for that.
 template <class T, class Write>
@@ -113,10 +114,10 @@ MESHLESS_ARCHIVE(Appearance, outer, inner)
 template <class A>
 void serialize(A& archive, Material& v) {
   auto& [name, youngs_modulus, poissons_ratio, stiffening, asymmetry, mode, alpha, beta, density, damping, friction,
-         restitution, toughness, self_contact, volume, area, plasticity, relaxation, color, inside_color, appearance] = v;
+         restitution, toughness, self_contact, volume, area, plasticity, relaxation, fibres, color, inside_color, appearance] = v;
   archive(name, youngs_modulus, poissons_ratio, stiffening, asymmetry, choice(mode, MatchMode::kQuadratic), alpha, beta,
           density, damping, friction, restitution, toughness, choice(self_contact, SelfContact::kAll), volume, area, plasticity,
-          relaxation, color, inside_color, appearance);
+          relaxation, fibres, color, inside_color, appearance);
 }
 template <class A>
 void serialize(A& archive, WorldSettings& v) {
@@ -165,16 +166,16 @@ MESHLESS_ARCHIVE(CollisionSurface, mesh, binding, distance)
 template <class A>
 void serialize(A& archive, BodyModel& v) {
   auto& [rest, masses, fixed, any_fixed, graph, lattice, cell_mass, regions, cells, clamp_points, clamp,
-         held_middles, held_by, tissue, grouping, clusters, shape, match_masses, elastic, elastic_batch, length,
-         specific_stiffness, poissons_ratio, highest_frequency, own, surface, texture, binding, collision, cavities, solid, incised, spacing, rest_volume,
+         held_middles, held_by, tissue, grouping, clusters, shape, match_masses, elastic, elastic_batch, fibre_direction, fibres, specific_fibres, length,
+         specific_stiffness, poissons_ratio, highest_frequency, own, unstressed, surface, texture, binding, collision, cavities, solid, incised, spacing, rest_volume,
          rest_area, mass, next_patch] = v;
   (void)elastic_batch, (void)cells, (void)clamp, (void)tissue, (void)cavities;
   auto of_contact = collision ? *collision : CollisionSurface();
   auto of_cells = lattice ? *lattice : CellLattice();
   std::vector<std::uint8_t> held(fixed.begin(), fixed.end());
-  archive(of_cells, cell_mass, regions, clamp_points, held_middles, held_by);
+  archive(of_cells, cell_mass, regions, clamp_points, held_middles, held_by, fibre_direction, fibres, specific_fibres);
   archive(rest, masses, held, any_fixed, graph, grouping, clusters, shape, match_masses, elastic, length,
-          specific_stiffness, poissons_ratio, highest_frequency, own, surface, texture, binding, of_contact, solid,
+          specific_stiffness, poissons_ratio, highest_frequency, own, unstressed, surface, texture, binding, of_contact, solid,
           incised, spacing, rest_volume, rest_area, mass, next_patch);
   if constexpr (std::is_same_v<A, InArchive>) {
     if (!of_contact.mesh.vertices.empty()) collision = std::make_shared<CollisionSurface>(std::move(of_contact));
@@ -221,8 +222,8 @@ void serialize(A& archive, CavityFill& v) {
 template <class A>
 void serialize(A& archive, BodyDef& v) {
   auto& [name, mesh, texture, solid, thickness, pose, spacing, resolution, clusters, collision, material, fixed,
-         cavities, regions, copy, notes, warnings] = v;
-  (void)texture, (void)regions, (void)thickness;  // the model has them
+         cavities, prestretch, fibre_direction, regions, copy, notes, warnings] = v;
+  (void)texture, (void)regions, (void)thickness, (void)prestretch, (void)fibre_direction;  // the model has them
   archive(name, mesh, solid, pose, spacing, choice(resolution, Resolution::kFine), clusters, collision, material, fixed,
           cavities, copy, notes, warnings);
 }

@@ -468,10 +468,13 @@ TEST(ElasticCells, InVectorsAreTheReference) {
         materials.pop_front();
         const ElasticParameters& material = materials.front();
         const Points y = moved(body, random.rotation().toRotationMatrix(), random.vector(0.1), noise, random);
+        std::vector<PlasticShape> shapes;
+        if (random.integer(0, 1)) shapes = someShapes(body.cells.cells.size(), random);
         Points expected;
         MatchCounters counted;
         std::vector<ClusterPose> poses = body.poses;
-        const double stretch = elasticAccelerations(body.cells, material, y, poses, expected, counted, swelling);
+        const double stretch =
+            elasticAccelerations(body.cells, material, y, poses, expected, counted, swelling, &shapes);
         double scale = kScale;
         for (const Vec3& a : expected) scale = std::max(scale, a.norm());
         for (const InstructionSet set : {InstructionSet::kBaseline, InstructionSet::kAvx2, InstructionSet::kAvx512}) {
@@ -480,6 +483,7 @@ TEST(ElasticCells, InVectorsAreTheReference) {
           Points found;
           MatchCounters counters;
           batch.setRotations(body.poses, state);
+          batch.setUnstressed(shapes, state);
           EXPECT_NEAR(batch.accelerate({body.rest, body.cells.masses, {}, {}}, material, y, state, found, counters,
                                        swelling, set),
                       stretch, 1e-9 * stretch);

@@ -255,7 +255,7 @@ class Fuzzer:
             return dict(body='', yaml='{%s: %.3f}' % (r.choice(['restitution', 'friction', 'damping']), r.random()))
         if service == 'set_material':
             yaml = r.choice(yaml_bombs()) if r.random() < 0.3 else '{%s: %s}' % (
-                r.choice(['alpha', 'beta', 'mode', 'density', 'youngs_modulus', 'friction', 'damping', 'colour', 'stiffening', 'asymmetry', 'toughness', 'relaxation',
+                r.choice(['alpha', 'beta', 'mode', 'density', 'youngs_modulus', 'friction', 'damping', 'colour', 'stiffening', 'asymmetry', 'toughness', 'relaxation', 'fibres',
                           'volume']),
                 r.choice([self.number(), self.string()[:200], '[1, 2]', '[[0, 0.5]]', '{}']))
             return dict(body=self.maybe_name(), yaml=yaml)

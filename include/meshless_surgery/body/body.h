@@ -88,11 +88,16 @@ struct BodyModel {
   std::vector<double> match_masses;
   std::vector<ElasticRest> elastic;                   // of clusters that are elastic
   std::shared_ptr<const ElasticBatch> elastic_batch;  // of cells or elastic clusters, vectorised; null: there are none
+  Vec3 fibre_direction = Vec3::Zero();  // at rest; zero: along the body
+  std::vector<Vec3> fibres;             // unit, one a cell of it where the material has or had fibres, else empty
+  double specific_fibres = 0.0;         // [m^2/s^2] their stiffness over density
   double length = 0.0;              // [m] longest extent at rest, of a piece that of the body that was cut first
   double specific_stiffness = 0.0;  // [m^2/s^2] Young's modulus over density
   double poissons_ratio = 0.0;
   double highest_frequency = 0.0;  // [rad/s] of cells or elastic clusters: see longestSubstep()
   Pose own;                        // from the frame of rest positions to the body's own, that of its file
+  PlasticShape unstressed;         // of each cell at the start; its inverse is the prestretch
+  bool isPrestretched() const { return unstressed.stiffening > 1.0; }
   TriangleMesh surface;            // rest positions of the vertices [m]
   TextureMapPtr texture;           // of its file, which its pieces share; null: it has none
   SurfaceBinding binding;
@@ -127,6 +132,8 @@ void makeTissue(BodyModel& model, const Material& material);
 ElasticParameters elasticityOf(const Material& material, double length);
 /// The same of what cells or elastic clusters are of, stiffened by a factor.
 ElasticParameters ownElasticity(const BodyModel& model, const Material& material, double factor = 1.0);
+/// The stiffness over density that highest_frequency is of.
+ElasticParameters specificElasticity(const BodyModel& model);
 /// clamp, from clamp_points.
 void makeClamp(BodyModel& model);
 /// cells and elastic_batch of the lattice, or of the clusters where they are elastic.

@@ -72,6 +72,10 @@ struct BodyDef {
   Material material;
   std::vector<HeldRegion> fixed;
   CavityFill cavities;
+  /// By how much tissue is drawn out along the body's own axes, compared with its shape without stress: 0.25 to 4 each,
+  /// of product 1. Needs a solid of an elastic material.
+  Vec3 prestretch = Vec3::Ones();
+  Vec3 fibre_direction = Vec3::Zero();  // of the material's fibres, in the body's own frame; zero: along the body
   std::vector<TissueRegion> regions;  // where several are, the last one counts; up to 100
   bool copy = false;                  // the same as the body before it in its scene, but for name and pose
   std::vector<std::string> notes;     // what reading and repairing said

@@ -31,6 +31,8 @@ struct ElasticParameters {
   double stiffening = 0.0;  // >= 0, see elasticAccelerations()
   double asymmetry = 0.0;   // likewise, any sign
   RelaxationStep relaxation;
+  double fibres = 0.0;             // [Pa] of cells that have a direction of fibres
+  double fibre_stiffening = 0.0;   // >= 0
 
   bool stiffens() const { return stiffening != 0.0 || asymmetry != 0.0; }
 };
@@ -52,7 +54,9 @@ struct ElasticMix {
             body.density,
             own * body.stiffening + stiffening,
             own * body.asymmetry + asymmetry,
-            body.relaxation};
+            body.relaxation,
+            own * body.fibres,
+            body.fibre_stiffening};
   }
 };
 

@@ -13,6 +13,7 @@ namespace meshless {
 struct ElasticBatchState {
   std::vector<double> rotations;
   std::vector<double> relaxed;      // of lanes; empty where the material does not relax
+  std::vector<double> unstressed;   // likewise; empty where nothing has flowed
   std::vector<ClusterPose> others;  // of clusters that the reference computes
   std::vector<double> forces;
   std::vector<double> largest;  // of each block
@@ -36,6 +37,9 @@ class ElasticBatch {
   /// Likewise what cells have relaxed by, in `branches` of a relaxation; 0: nothing relaxes.
   void setRelaxed(const std::vector<RelaxedStrain>& relaxed, int branches, ElasticBatchState& state) const;
   void getRelaxed(const ElasticBatchState& state, std::vector<RelaxedStrain>& relaxed) const;
+
+  /// The shapes that cells have without stress, one a cell; empty: those at rest. Of cells alone.
+  void setUnstressed(const std::vector<PlasticShape>& shapes, ElasticBatchState& state) const;
 
   /// As elasticAccelerations() for the input or the cells that this was made from (then input is not read), in double:
   /// what differs is rounding, and a rotation is found to 1e-12 rad. A particle that is not finite spoils its clusters'
@@ -67,6 +71,7 @@ class ElasticBatch {
   std::vector<double> shapes_;  // of clusters
   std::vector<double> cells_;   // of blocks of cells that are filled in part
   std::vector<double> mixes_;   // of these, where there are several materials
+  std::vector<double> fibres_;  // directions in all cells, where some have one
   bool mix_stiffens_ = false;   // one of them
   double half_edge_ = 1.0;
   // Where the forces on a particle lie, in the order of its clusters' lanes.

@@ -16,6 +16,7 @@ struct ElasticCell {
   Vec3 centroid = Vec3::Zero();               // of it, within -0.9..0.9
   Vec3 variance = Vec3::Constant(1.0 / 3.0);  // of it about its centroid, > 0; 1/3 is that of a whole cell
   ElasticMix mix;
+  Vec3 fibre = Vec3::Zero();  // unit, along which its fibres lie at rest; zero: it has none
 };
 
 struct ElasticCells {
@@ -31,7 +32,8 @@ struct ElasticCells {
 /// elasticAccelerations() in elastic.h. e_k (2x2) is how the strain along the two other axes varies along axis k, by
 /// the coefficients of the map's products of two coordinates about the centroid, measured along the columns of F over
 /// |F|/sqrt(3); with q = lambda / (lambda + 2 mu) it costs what it costs a plate. No shear across it is counted twice:
-/// thin plates do not lock (MITC4: Dvorkin and Bathe 1984). The last term holds the product of all three. Conserves
+/// thin plates do not lock (MITC4: Dvorkin and Bathe 1984). The last term holds the product of all three. Fibres along a
+/// add V k/2 W((|F a| - 1)^2) where |F a| > 1, W as in elastic.h, and nothing to bending within a cell. Conserves
 /// linear and angular momentum to rounding. poses, one a cell: the rotation is read (where the search starts) and
 /// written, as centre (the centroid [m]) and deformation (F) are. swelling: strain is that of F / swelling. plastic:
 /// one a cell; null or empty where nothing has flowed. relaxed: one a cell where the material relaxes, with the part of

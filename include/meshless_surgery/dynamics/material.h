@@ -46,6 +46,13 @@ struct Relaxation {
   double time = 1.0;   // [s] 1e-4..1e6
 };
 
+/// Fibres that lie in an elastic material: they pull where they are longer than at rest, and never push. How they lie is
+/// the body's (BodyDef::fibre_direction).
+struct Fibres {
+  double stiffness = 0.0;   // [Pa] 0..1e12, what they add to Young's modulus along them; 0: there are none
+  double stiffening = 0.0;  // 0..1000, how their pull grows beyond small strain: dynamics/elastic.h
+};
+
 /// Two families. An appearance material has a youngs_modulus of 0: mode, alpha and beta are the paper's; see goalPull
 /// for alpha. An elastic material has a youngs_modulus: the elastic constants of a textbook, without calibration
 /// (dynamics/elastic.h); mode, alpha and beta are then not used.
@@ -68,6 +75,7 @@ struct Material {
   ResponseCurve area;                            // of the surface
   Plasticity plasticity;
   std::vector<Relaxation> relaxation;             // of an elastic material, at most kMostRelaxations
+  Fibres fibres;                                  // likewise
   Color color{0.62f, 0.22f, 0.18f, 1.0f};         // of the outer surface
   Color inside_color{0.85f, 0.45f, 0.40f, 1.0f};  // of cut faces
   Appearance appearance;                          // patterns over both
@@ -75,6 +83,7 @@ struct Material {
   bool bends() const { return elastic() || mode != MatchMode::kRigid; }
   bool elastic() const { return youngs_modulus > 0.0; }
   bool relaxes() const { return elastic() && !relaxation.empty(); }
+  bool hasFibres() const { return elastic() && fibres.stiffness > 0.0; }
   bool plastic() const { return plasticity.creep > 0.0 && plasticity.maximum > 0.0; }
   /// Why the settings are not usable, naming key, value and range; else Done.
   Status validate() const;

@@ -60,9 +60,10 @@ struct LoadedShape {
 /// What a patient's coordinates may run to: x to the left, y to the back and z up (DICOM, ITK), or x to the right, y to
 /// the front and z up (Slicer, NIfTI).
 constexpr std::array<const char*, 2> kSpaces{{"LPS", "RAS"}};
-/// `space`: to which a file of the other one is turned, half a turn about z; empty: it stays as it is.
+/// `space`: to which a file of the other one is turned, half a turn about z; empty: it stays as it is. y_up: the file's y
+/// is up, and is made z by a quarter of a turn about x.
 Result<LoadedShape> loadShape(const std::string& real_path, double scale, MeshRepair repair = MeshRepair::kMend,
-                              const std::string& space = "");
+                              const std::string& space = "", bool y_up = false);
 
 /// OBJ with 17 significant digits; written beside the file and renamed. false where the disk refuses.
 Status writeObj(const std::string& path, const TriangleMesh& mesh, const std::string& comment);
