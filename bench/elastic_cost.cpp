@@ -16,14 +16,14 @@ constexpr double kRotation = 2 * 4 * 8;    // ElasticBatchState::rotations, read
 constexpr double kForces = 2 * 3 * 8 * 8;  // forces: written by a block, read by sumForces()
 constexpr double kPlaces = 8 * 4;          // force_places_
 constexpr double kBoxBytes = kIndices + kMass + kRotation + kForces + kPlaces;
-constexpr double kFilling = 10 * 8;                       // cells_: kCellRows, of cells that are filled in part
+constexpr double kFilling = 6 * 8;                        // cells_: kCellRows, of cells that are filled in part
 constexpr double kParticleBytes = 3 * 8 + 4 + 8 + 3 * 8;  // y, force_offsets_, inverse_masses_, accelerations
 
 // Operations of a cell, function by function of src/dynamics/elastic_batch_kernel.h, as written there. A fused
 // multiplication and addition is two. Comparisons, choices and signs are none.
 constexpr double kGather = 8 * 3;                     // each corner less the first
-constexpr double kFitBox = 3 * 22;                    // an axis: centre 8, columns of F 8, 4, 2
-constexpr double kFitCell = 3 * 75;                   // an axis: 12 pairs of 6, three scales
+constexpr double kFitBox = 3 * 31;                    // an axis: 12 pairs of 2, seven scales
+constexpr double kFitCell = 3 * 55;                   // an axis: 12 pairs of 4, seven scales
 constexpr double kRotationMatrix = 24;                // 12 products, 12 sums
 constexpr double kNewtonStep = 24 + 45                // the rotation's matrix, R^T F
                                + 12 + 18 + 5 + 1      // gradient and Hessian, cofactors, determinant, 0.5 over it
@@ -33,11 +33,15 @@ constexpr double kNewton = 2 * kNewtonStep + 8 + 13;  // two steps, `s` between 
 constexpr double kStress = 9 + kRotationMatrix + 27 + 5 + 18 + 2  // F, R, cof F, J, |F|^2, `beyond`
                            + 1 + 1 + 3 + 18 + 36;                 // strain, pressure, steepness 3 and 18, P
 constexpr double kMix = 6;                                        // shear and pressure of a cell filled in part
-constexpr double kPushBox = 2 + 3 * 44;                           // an axis: h 15, middle 1, sums 4, eight corners of 3
-constexpr double kPushCell = 2 + 3 * 83;                          // an axis: coefficients 3 and 8, 12 pairs of 6
+constexpr double kBend = 4 + 30 + 18 + 5                           // stiffness, F^T F, its square, longest
+                         + 27 + 45 + 1                            // |modes|^2, modes along the columns, one over
+                         + 27 + 48 + 3                            // slopes, and of the energy by them
+                         + 3 * 75 + 6;                            // an axis: by F 48, by the modes 27; the last mode
+constexpr double kPushBox = 2 + 3 * 31;                           // an axis: seven coefficients, 12 pairs of 2
+constexpr double kPushCell = 2 + 3 * 55;                          // an axis: seven coefficients, 12 pairs of 4
 constexpr double kSum = 8 * 3;                                    // sumForces()
-constexpr double kBoxOperations = kGather + kFitBox + kNewton + kStress + kPushBox + kSum;
-constexpr double kCellOperations = kGather + kFitCell + kNewton + kStress + kMix + kPushCell + kSum;
+constexpr double kBoxOperations = kGather + kFitBox + kNewton + kStress + kBend + kPushBox + kSum;
+constexpr double kCellOperations = kGather + kFitCell + kNewton + kStress + kMix + kBend + kPushCell + kSum;
 constexpr double kParticleOperations = 3;  // times the inverse mass
 
 constexpr int kForcePasses = 7;
@@ -63,7 +67,7 @@ ElasticTime timeElastic(const BodyModel& model, const Material& material) {
   ElasticBatchState state;
   Points accelerations;
   MatchCounters counters;
-  model.elastic_batch->setRotations(std::vector<ClusterPose>(model.clusters.size()), state);
+  model.elastic_batch->setRotations(std::vector<ClusterPose>(model.cells->cells.size()), state);
   int calls = 2;
   ElasticTime time;
   for (int pass = 0; pass < kForcePasses;) {

@@ -91,37 +91,21 @@ void runFrames(benchmark::State& state, const std::shared_ptr<const PreparedBody
   state.counters["riders"] = static_cast<double>(body->model->binding.size());
 }
 
-// The same body in a plain loop on elasticAccelerations(), with the substeps that the world takes and without the
-// ground, its embedded vertices or anything else to meet.
+// The same frames without vectors: a material that may flow takes the plain path, and this one never does.
 void runPlainLiver(benchmark::State& state, const std::shared_ptr<const PreparedBody>& liver) {
   if (!liver) return state.SkipWithError("the body could not be prepared");
-  Plain body;
-  body.model = *liver->model;
-  body.state = liver->state;
-  const Material material = liver->def.material;
-  World world(settingsOf(std::nullopt));
-  if (!world.addSceneBody(liver)) return state.SkipWithError("the body could not be added");
-  double substeps = 0.0, frames = 0.0;
-  const auto frame = [&](std::size_t count) {
-    BatchStep step = stepOf(material);
-    step.h = 1.0 / kFrameRate / static_cast<double>(count);
-    for (std::size_t n = 0; n < count; ++n) plainElasticStep(body, material, step);
-    substeps += static_cast<double>(count);
-    frames += 1.0;
-  };
+  auto plain = std::make_shared<PreparedBody>(*liver);
+  plain->def.material.plasticity.creep = 1e-300;
+  World vectors(settingsOf(0.0)), reference(settingsOf(0.0));
+  if (!vectors.addSceneBody(liver) || !reference.addSceneBody(plain))
+    return state.SkipWithError("the body could not be added");
   for (int n = 0; n < kSettle; ++n) {
-    world.step();
-    frame(world.snapshot({}).report.substeps);
+    vectors.step();
+    reference.step();
   }
-  const double apart = farthest(world.snapshot({false, true, false}).bodies[0].particles, body.state.positions);
-  for (auto _ : state) {
-    state.PauseTiming();
-    world.step();
-    const std::size_t count = world.snapshot({}).report.substeps;
-    state.ResumeTiming();
-    frame(count);
-  }
-  state.counters["substeps"] = substeps / frames;
+  const auto particles = [](World& world) { return world.snapshot({false, true, false}).bodies[0].particles; };
+  const double apart = farthest(particles(vectors), particles(reference));
+  runFrames(state, plain, settingsOf(0.0), {});
   state.counters["error"] = apart / 0.1;  // of the liver's width, after kSettle frames
 }
 
