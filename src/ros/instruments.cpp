@@ -11,7 +11,8 @@ namespace {
 using Part = meshless_surgery::InstrumentPart;
 
 // [m] of the meshes
-constexpr double kBladeLength = 0.06, kShaftRadius = 0.0025, kShaftLength = 0.3, kJawLength = 0.018;
+constexpr double kBladeLength = 0.06, kShaftRadius = 0.0025, kShaftLength = 0.3, kJawLength = 0.018,
+                 kScalpelLength = 0.026;
 constexpr double kShownReach = 0.1;  // [m] of blades without an end
 constexpr double kToGrip = 0.015;    // [m] from the joint of a grasper to what its jaws hold
 constexpr double kHolding = 0.15;    // [rad] between jaws that hold tissue
@@ -80,6 +81,8 @@ std::vector<Part> Instruments::parts(const WorldSnapshot& snapshot, const std::o
       parts.push_back(part("shaft", {aside.rotation * Eigen::AngleAxisd(turn, Vec3::UnitZ()), aside.translation},
                            def.jaw_length / kShaftLength));
     }
+    if (def.type == InstrumentType::kScalpel)
+      parts.push_back(part("scalpel", instrument.pose, def.jaw_length / kScalpelLength));
     if (!def.hasJaws()) continue;
     const std::size_t first = parts.size();
     const bool blades = def.type == InstrumentType::kScissors;

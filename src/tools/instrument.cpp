@@ -12,7 +12,8 @@ namespace meshless {
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
-constexpr int kSides = 10;             // of a shaft
+constexpr int kSides = 10;  // of a shaft
+constexpr int kEdgePoints = 6;
 constexpr double kJawSpeed = 10.0;     // [rad/s] of a hand
 constexpr double kTurnSpeed = 50.0;    // [rad/s] likewise
 constexpr double kJawTime = 0.01;      // [s] in which a jaw gives way to what it cannot hold
@@ -103,7 +104,7 @@ void aimFrom(const Vec3& centre, Pose& pose) {
 
 }  // namespace
 
-const std::array<InstrumentNumber, 14> kInstrumentNumbers{
+const std::array<InstrumentNumber, 15> kInstrumentNumbers{
     {{"shaft_radius", &InstrumentDef::shaft_radius, 1e-4, 0.1, "m"},
      {"shaft_length", &InstrumentDef::shaft_length, 1e-3, 10.0, "m"},
      {"jaw_length", &InstrumentDef::jaw_length, 1e-3, 1.0, "m"},
@@ -117,7 +118,8 @@ const std::array<InstrumentNumber, 14> kInstrumentNumbers{
      {"max_force", &InstrumentDef::max_force, 0.01, 1e4, "N"},
      {"max_torque", &InstrumentDef::max_torque, 1e-4, 1e3, "N m"},
      {"max_speed", &InstrumentDef::max_speed, 1e-3, 5.0, "m/s"},
-     {"grip", &InstrumentDef::grip, 0.01, 1e3, "N"}}};
+     {"grip", &InstrumentDef::grip, 0.01, 1e3, "N"},
+     {"sharpness", &InstrumentDef::sharpness, 0.01, 1.0, ""}}};
 
 const char* toString(InstrumentType type) {
   switch (type) {
@@ -131,6 +133,8 @@ const char* toString(InstrumentType type) {
       return "scissors";
     case InstrumentType::kClipApplier:
       return "clip_applier";
+    case InstrumentType::kScalpel:
+      return "scalpel";
   }
   return "unknown";
 }
@@ -171,8 +175,8 @@ Status InstrumentDef::validate() const {
                                                   numberText(points, 3) + " points; accepted: up to " +
                                                   numberText(kMostPoints)};
   if (latch && type != InstrumentType::kGrasper)
-    return Error{ErrorCode::kInvalidArgument, "grasp of instrument '" + name + "', a " + toString(type) +
-                                                  ", is latch; accepted: of graspers alone"};
+    return Error{ErrorCode::kInvalidArgument,
+                 "grasp of instrument '" + name + "', a " + toString(type) + ", is latch; accepted: of graspers alone"};
   if (type == InstrumentType::kHook && !(jaw_length >= 2.0 * shaft_radius))
     return Error{ErrorCode::kInvalidArgument, "jaw_length of instrument '" + name + "' is " + numberText(jaw_length) +
                                                   " m; accepted: of a hook, at least two shaft_radius"};
@@ -192,8 +196,10 @@ void InstrumentShape::place(const Pose& pose, double jaw, Points& vertices) cons
   const Mat3 half = Eigen::AngleAxisd(0.5 * jaw, Vec3::UnitZ()).toRotationMatrix();
   const Mat3 of_part[] = {turn, turn * half, turn * half.transpose()};
   const Vec3 at_hinge = pose * hinge;
-  vertices.resize(mesh.vertices.size());
-  for (Index v = 0; v < vertices.size(); ++v) vertices[v] = at_hinge + of_part[parts[v]] * (mesh.vertices[v] - hinge);
+  const Index count = static_cast<Index>(mesh.vertices.size());
+  vertices.resize(count + edge.size());
+  for (Index v = 0; v < count; ++v) vertices[v] = at_hinge + of_part[parts[v]] * (mesh.vertices[v] - hinge);
+  for (Index k = 0; k < edge.size(); ++k) vertices[count + k] = pose * edge[k];
 }
 
 InstrumentShape shapeOf(const InstrumentDef& def) {
@@ -210,6 +216,11 @@ InstrumentShape shapeOf(const InstrumentDef& def) {
     add(moved(capsule(-def.shaft_length, def.shaft_radius), {Quat::Identity(), elbow}), InstrumentShape::kShaft);
     add(moved(capsule(-def.jaw_length, def.shaft_radius), byTurn(0.5 * kPi, Vec3(-def.shaft_radius, 0.0, 0.0))),
         InstrumentShape::kShaft);
+  }
+  if (def.type == InstrumentType::kScalpel) {
+    const Vec3 handle(-def.jaw_length, 0.0, 0.0);
+    add(moved(capsule(-def.shaft_length, def.shaft_radius), {Quat::Identity(), handle}), InstrumentShape::kShaft);
+    for (int k = 0; k < kEdgePoints; ++k) shape.edge.push_back(k / (kEdgePoints - 1.0) * def.heel());
   }
   if (def.hasJaws()) {
     shape.hinge = Vec3(-def.jaw_length, 0.0, 0.0);
@@ -247,7 +258,7 @@ bool Instrument::isFinite() const {
          load.torque.allFinite() && std::isfinite(load.jaw) && std::isfinite(load.mass) &&
          std::isfinite(load.inertia) && std::isfinite(load.jaw_inertia) && force.allFinite() && torque.allFinite() &&
          std::isfinite(jaw_torque) && std::isfinite(resists) && std::isfinite(cut_torque) && std::isfinite(cut_work) &&
-         std::isfinite(owed);
+         std::isfinite(owed) && cut_force.allFinite();
 }
 
 double Instrument::cutsTo() const {
@@ -261,8 +272,10 @@ void Instrument::comeBack() {
   velocity = spin = force = torque = Vec3::Zero();
   jaw_rate = jaw_torque = jaw_stop = answers = cut_torque = cut_work = owed = resists = 0.0;
   cut_to = cutsTo();
+  cut_force.setZero();
   load = InstrumentLoad();
   aim();
+  edge_at = pose;
 }
 
 void Instrument::aim() {
@@ -271,8 +284,19 @@ void Instrument::aim() {
 
 void Instrument::move(const Pose& hand_then, double jaw_then, double h) {
   const Drawn along{def.stiffness, def.damping, def.max_force};
-  const Vec3 go = along.step(load.mass, velocity, load.force, hand.translation - pose.translation,
-                             hand_then.translation - hand.translation, h, answers);
+  const Vec3 behind_hand = hand.translation - pose.translation, hand_goes = hand_then.translation - hand.translation;
+  cut_force.setZero();
+  bool stands = false;  // the edge does
+  if (def.type == InstrumentType::kScalpel && resists > 0.0) {
+    // As dry friction against the way: toughness times the area that the way opens (Atkins 2009).
+    const Vec3 holds = along.toHold(load.mass, velocity, load.force, behind_hand, hand_goes, h);
+    const double needed = holds.squaredNorm(), given = -resists * (pose.rotation * def.ahead()).dot(holds);
+    stands = given > 0.0 && given >= needed;
+    if (given > 0.0) cut_force = (stands ? 1.0 : given / needed) * holds;
+  }
+  Vec3 go = along.step(load.mass, velocity, load.force + cut_force, behind_hand, hand_goes, h, answers);
+  if (stands) go.setZero();  // a hand at its limit draws as much wherever that is
+  cut_work += std::max(0.0, -cut_force.dot(go));
   double of_turn = 0.0;
   const Drawn about{def.angular_stiffness, def.angular_damping, def.max_torque};
   const Vec3 turn = about.step(load.inertia, spin, load.torque, turnVector(hand.rotation * pose.rotation.conjugate()),

@@ -14,7 +14,7 @@ struct InstrumentBody {
   std::shared_ptr<const InstrumentShape> shape;
   ContactSurface surface;
   std::vector<double> inverse_masses;  // [1/kg] 0, one a vertex
-  Points positions;                    // [m] vertices now
+  Points positions;                    // [m] vertices now, and an edge
   Points before;                       // [m] at the start of the substep
   Points velocities;                   // [m/s] of the part of the frame that comes
   Pose hand_then;                      // where the hand gets in this frame

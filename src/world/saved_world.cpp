@@ -119,14 +119,14 @@ void checkBatches(const SavedWorld& world) {
 }
 
 bool isThere(const Instrument& instrument) {
-  for (const Pose& pose : {instrument.target, instrument.hand, instrument.pose})
+  for (const Pose& pose : {instrument.target, instrument.hand, instrument.pose, instrument.edge_at})
     if (!(pose.translation.norm() <= 1e6) || !(std::abs(pose.rotation.norm() - 1.0) <= 1e-6)) return false;
   for (const double jaw : {instrument.jaw_target, instrument.jaw_hand, instrument.jaw})
     if (!(jaw >= 0.0 && jaw <= kWidestJaw)) return false;
   const InstrumentLoad& load = instrument.load;
   for (const Vec3& v :
        {instrument.velocity, instrument.spin, load.force, load.torque, instrument.force, instrument.torque,
-        instrument.latch_at, instrument.latch_force})
+        instrument.latch_at, instrument.latch_force, instrument.cut_force})
     if (!(v.norm() <= 1e12)) return false;
   for (const double x : {instrument.owed, instrument.jaw_rate, load.jaw, instrument.jaw_torque, instrument.gripped})
     if (!(std::abs(x) <= 1e12)) return false;

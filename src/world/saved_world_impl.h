@@ -11,7 +11,7 @@
 
 namespace meshless {
 
-constexpr std::uint32_t kStateVersion = 31;
+constexpr std::uint32_t kStateVersion = 32;
 
 inline std::uint32_t checksum(std::string_view bytes) {
   return static_cast<std::uint32_t>(
@@ -253,14 +253,14 @@ MESHLESS_ARCHIVE(Scissors, shown, blades, angle)
 template <class A>
 void serialize(A& archive, InstrumentDef& v) {
   auto& [name, type, pose, shaft_radius, shaft_length, jaw_length, jaw_width, jaw_thickness, friction, stiffness,
-         damping, angular_stiffness, angular_damping, max_force, max_torque, max_speed, grip, latch, remote_centre, color] = v;
-  archive(name, choice(type, InstrumentType::kClipApplier), pose, shaft_radius, shaft_length, jaw_length, jaw_width,
+         damping, angular_stiffness, angular_damping, max_force, max_torque, max_speed, grip, sharpness, latch, remote_centre, color] = v;
+  archive(name, choice(type, InstrumentType::kScalpel), pose, shaft_radius, shaft_length, jaw_length, jaw_width,
           jaw_thickness, friction, stiffness, damping, angular_stiffness, angular_damping, max_force, max_torque,
-          max_speed, grip, latch, remote_centre, color);
+          max_speed, grip, sharpness, latch, remote_centre, color);
 }
 MESHLESS_ARCHIVE(BladeWound, body, origin, x_axis, y_axis, least, most, stroke)
 MESHLESS_ARCHIVE(InstrumentLoad, force, torque, jaw, mass, inertia, jaw_inertia)
-MESHLESS_ARCHIVE(Instrument, def, number, target, jaw_target, hand, jaw_hand, pose, jaw, velocity, spin, jaw_rate, jaw_stop, cut_to, wounds, stroke, resists, cut_torque, cut_work, owed, answers, load,
+MESHLESS_ARCHIVE(Instrument, def, number, target, jaw_target, hand, jaw_hand, pose, jaw, velocity, spin, jaw_rate, jaw_stop, cut_to, wounds, stroke, in_tissue, edge_at, cut_force, resists, cut_torque, cut_work, owed, answers, load,
                  force, torque, jaw_torque, holds, gripped, closed_to, loaded, lost_for, latched, latch_at, latch_force)
 MESHLESS_ARCHIVE(CutCommand, blades, close_time, roughness, bodies)
 MESHLESS_ARCHIVE(ClosingCut, ticket, command, done_at, start_angle, started_at)

@@ -391,6 +391,10 @@ struct World::Impl : KeptWorld {
   void cutByInstruments();
   /// Whether there was something to cut.
   bool snip(std::size_t n, WorldBody& body, double cuts_to, bool snips);
+  void cutByEdge(std::size_t n);
+  enum class EdgeIs { kOutside, kInside, kLeaving };
+  /// Where the edge of a scalpel is; what it has swept opens where it cuts.
+  EdgeIs sweepEdge(std::size_t n, WorldBody& body, bool cuts);
   bool cutWound(std::size_t n, WorldBody& body, BladeWound wound, const Vec2& from, const Vec2& to,
                 const InciseCommand& command);
   /// [m] of what is deepest in an obstacle; zero: nothing is.

@@ -2,9 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "line_search.h"
 #include "meshless_surgery/base/number_text.h"
-#include "meshless_surgery/body/cut_body.h"
 #include "meshless_surgery/geometry/mesh/measures.h"
 #include "meshless_surgery/geometry/query/inside.h"
 #include "meshless_surgery/tools/grasp.h"
@@ -16,16 +14,12 @@ namespace {
 constexpr double kHolds = 0.01;   // [N] on each jaw: they hold what is between them
 constexpr double kLostFor = 0.1;  // [s] without: they have lost it
 constexpr double kCrushed = 0.1;  // of the angle at which jaws have met tissue: they close no further
-constexpr double kFires = 0.5;    // of that angle: a clip applier has closed; likewise where it presses with so much of grip
-constexpr double kReloads = 0.1;  // [rad] that it opens before it has another clip
-constexpr double kRests = 1e-6;   // [m/s] slower instruments wake nobody
-constexpr double kSnip = 0.125;   // of blades: they have closed on so much more before it is cut, or close no further
-constexpr double kJoins = 3e-4;   // [m] by which a snip goes over the last one, and beyond tissue
-constexpr double kGoesOn = 0.8;   // cosine: blades turned less go on with the wound of an earlier stroke
-constexpr int kWaysOut = 4;       // of an instrument from obstacles, at most, in a step of
+constexpr double kFires =
+    0.5;  // of that angle: a clip applier has closed; likewise where it presses with so much of grip
+constexpr double kReloads = 0.1;                          // [rad] that it opens before it has another clip
+constexpr double kRests = 1e-6;                           // [m/s] slower instruments wake nobody
+constexpr int kWaysOut = 4;                               // of an instrument from obstacles, at most, in a step of
 constexpr double kStepOut = 1e-3, kMostStepsOut = 100.0;  // [m], of which a substep has at most so many
-constexpr int kMostLines = 100;
-constexpr int kLines = 5;  // along a snip, on which its tissue is looked for
 
 bool isHand(const Pose& pose) {
   return pose.translation.norm() <= kFarthestHand && std::abs(pose.rotation.norm() - 1.0) <= 1e-3;
@@ -105,6 +99,7 @@ Result<Reply> World::Impl::apply(const AttachInstrumentCommand& command) {
   instrument.aim();
   instrument.hand = instrument.target = instrument.pose;
   instrument.cut_to = instrument.cutsTo();
+  instrument.edge_at = instrument.pose;
   auto body = std::make_shared<InstrumentBody>(def);
   body->place(instrument);
   const double lowest = boundsOf(body->positions).min.z();
@@ -174,230 +169,6 @@ Status World::addSceneInstrument(const InstrumentDef& def) {
   return Done{};
 }
 
-namespace {
-
-/// Tissue on a line across blades, that lies between their edges.
-struct BetweenBlades {
-  double low = 0.0, high = 0.0;  // [m] along the line, from the middle of the blades
-  Points rest;                   // [m] where the line goes in and out, in pairs
-  double thickness = 0.0;        // [m] at rest
-  Vec3 middle = Vec3::Zero();    // [m] likewise
-};
-
-BetweenBlades between(const std::vector<Crossing>& met, double gap, const ContactSurface& surface) {
-  BetweenBlades found;
-  const auto atRest = [&](const NearestFace& face) {
-    Vec3 sum = Vec3::Zero();
-    for (int k = 0; k < 3; ++k) sum += face.shares[k] * surface.rest[surface.triangles[face.face][k]];
-    return sum;
-  };
-  for (std::size_t n = 0; n + 1 < met.size(); ++n) {
-    if (!met[n].in || met[n + 1].in || met[n].at > gap || met[n + 1].at < -gap) continue;
-    const Vec3 from = atRest(met[n].face), to = atRest(met[n + 1].face);
-    found.low = std::min(found.low, met[n].at);
-    found.high = std::max(found.high, met[n + 1].at);
-    found.rest.insert(found.rest.end(), {from, to});
-    found.thickness += (to - from).norm();
-    found.middle += 0.5 * (to - from).norm() * (from + to);
-  }
-  if (found.thickness > 0.0) found.middle /= found.thickness;
-  return found;
-}
-
-BladeWound* woundOf(Instrument& instrument, const std::string& body) {
-  for (BladeWound& wound : instrument.wounds)
-    if (wound.body == body) return &wound;
-  return nullptr;
-}
-
-}  // namespace
-
-void World::Impl::cutByInstruments() {
-  for (std::size_t n = 0; n < instruments.size(); ++n) {
-    Instrument& instrument = instruments[n];
-    const InstrumentDef& def = instrument.def;
-    if (def.type != InstrumentType::kScissors) continue;
-    instrument.resists = 0.0;
-    const double length = def.jaw_length, cuts_to = instrument.cutsTo();
-    if (cuts_to < instrument.cut_to) {  // they open
-      if (cuts_to < instrument.cut_to - kJoins) ++instrument.stroke;
-      instrument.cut_to = cuts_to;
-      instrument.cut_work = instrument.owed = 0.0;
-    }
-    const double more = cuts_to - instrument.cut_to;
-    const bool whole = cuts_to == length, stops = !(instrument.jaw_rate < -kRests / length);
-    const bool snips = more > 0.0 && (more >= kSnip * length || whole || (stops && more >= kJoins));
-    const bool presses = !whole && instrument.jaw_target < instrument.jaw - kRests;
-    if (!snips && !presses) continue;
-    std::vector<std::string> near;
-    const Box blades = boundsOf(instrument_bodies[n]->positions);
-    for (const auto& body : bodies) {
-      if (!body->model->solid || (!snips && body->material.toughness == 0.0)) continue;
-      refreshSurface(*body);
-      if (boundsOf(body->state.surface).overlaps(blades)) near.push_back(body->name);
-    }
-    bool any = false;
-    for (const std::string& name : near) any = snip(n, *find(name), cuts_to, snips) || any;
-    if (snips && (any || whole)) {  // else there was air so far
-      instrument.cut_to = cuts_to;
-      instrument.owed -= std::exchange(instrument.cut_work, 0.0);
-    }
-    if (instrument.resists > 0.0)
-      instrument.resists = std::max(0.0, instrument.resists + instrument.owed / (kSnip * length));
-  }
-}
-
-bool World::Impl::snip(std::size_t n, WorldBody& body, double cuts_to, bool snips) {
-  Instrument& instrument = instruments[n];
-  const InstrumentDef& def = instrument.def;
-  // Lines across the blades, in the plane on which they slide along each other.
-  const Mat3 axes = instrument.pose.rotation.toRotationMatrix();
-  const LineFrame frame{instrument.pose * instrument_bodies[n]->shape->hinge, {axes.col(0), -axes.col(2), axes.col(1)}};
-  const ShownSurface shown = shownNow(body);
-  LineSearch lines(shown, frame, def.jaw_length + kJoins, 0.0);
-  const double slope = std::tan(0.5 * instrument.jaw);
-  const auto at = [&](double x) {
-    const double gap = std::max(slope * x - def.bladeOverlap(), 0.4 * def.jaw_thickness);
-    return between(lines.through(x, 0.0), gap, *shown.surface);
-  };
-  const BladeWound* const known = woundOf(instrument, body.name);
-  if (cuts_to < def.jaw_length && body.material.toughness > 0.0) {
-    // The area at rest that comes in this frame, for the way there.
-    Instrument then = instrument;
-    then.jaw += std::min(0.0, instrument.jaw_rate / settings.step_rate);
-    const double way = std::max(then.cutsTo() - cuts_to, kJoins), part = way / kLines;
-    const auto uncut = [&](double x) {
-      BetweenBlades tissue = at(x);
-      if (known && known->has(tissue.middle)) tissue.thickness = 0.0;
-      return tissue;
-    };
-    double area = 0.0;
-    BetweenBlades last = uncut(cuts_to);
-    for (int k = 1; k <= kLines; ++k) {
-      const BetweenBlades next = uncut(cuts_to + k * part);
-      const bool both = last.thickness > 0.0 && next.thickness > 0.0;
-      area += 0.5 * (last.thickness + next.thickness) * (both ? (next.middle - last.middle).norm() : part);
-      last = next;
-    }
-    instrument.resists += body.material.toughness * area / way;
-  }
-  if (!snips) return false;
-  const double begins = instrument.cut_to, more = cuts_to - begins, thickness = def.jaw_thickness;
-  const double apart = 0.25 * std::min(body.edge_length, thickness);
-  const int count = std::clamp(static_cast<int>(std::ceil(more / apart)), kLines, kMostLines);
-  double low = 0.0, high = 0.0;  // [m]
-  Points met;
-  for (int k = 0; k < count; ++k) {
-    const BetweenBlades tissue = at(begins + more * k / (count - 1));
-    low = std::min(low, tissue.low);
-    high = std::max(high, tissue.high);
-    met.insert(met.end(), tissue.rest.begin(), tissue.rest.end());
-  }
-  InciseCommand command;
-  command.bodies = {body.name};
-  command.blade = {frame.centre + begins * axes.col(0), axes.col(0), axes.col(1), more, kJoins, kJoins, 0.0};
-  const double margin = 2.0 * apart + kJoins;  // tissue is squeezed between two lines
-  const bool same_stroke = known && known->stroke == instrument.stroke;
-  const bool ends = at(cuts_to + kJoins).rest.empty();  // tissue does
-  if (met.empty()) {
-    // Blades that are through leave no thread between two lines, or beside them.
-    if (!same_stroke || !ends) return false;
-    BladeWound whole = *known;
-    --whole.stroke;  // once
-    whole.least -= Vec2::Constant(margin);
-    whole.most += Vec2::Constant(margin);
-    return cutWound(n, body, whole, whole.least, whole.most, command);
-  }
-  command.blade.depth -= low;
-  command.blade.rise += high;
-  // A wound is gone on with where what is between the blades is within their thickness of its plane, and at it; that of
-  // an earlier stroke, where the blades are in its plane too.
-  const auto extend = [&](const BladeWound& of, Vec2& least, Vec2& most) {
-    least.setConstant(std::numeric_limits<double>::infinity());
-    most = -least;
-    double farthest = 0.0;
-    for (std::size_t k = 0; k + 1 < met.size(); k += 2) {
-      const double beside = std::abs(of.beside(0.5 * (met[k] + met[k + 1])));
-      if (beside > def.jaw_width) continue;  // another layer of folded tissue is elsewhere at rest
-      farthest = std::max(farthest, beside);
-      for (const Vec3& p : {met[k], met[k + 1]}) {
-        least = least.cwiseMin(of.within(p));
-        most = most.cwiseMax(of.within(p));
-      }
-    }
-    return least.x() <= most.x() && farthest <= thickness;
-  };
-  Vec2 least, most;
-  std::optional<Blade> led;  // to a plane at rest
-  if (!same_stroke) led = bladeAtRest(*body.model, body.state, command.blade);
-  const auto turned = [&] { return std::abs(known->x_axis.cross(known->y_axis).dot(led->plane().normal)); };
-  bool goes_on = known && (same_stroke || (led && turned() > kGoesOn)) && extend(*known, least, most);
-  if (goes_on) {
-    const double near = kSnip * def.jaw_length;
-    goes_on = least.x() < known->most.x() + near && most.x() > known->least.x() - near &&
-              least.y() < known->most.y() + near && most.y() > known->least.y() - near;
-  }
-  BladeWound wound;
-  bool along = true;  // the wound grows along its x axis
-  if (goes_on) {
-    wound = *known;
-    along = most.x() - wound.most.x() >= wound.least.x() - least.x();
-  } else {
-    if (same_stroke) led = bladeAtRest(*body.model, body.state, command.blade);
-    if (!led) return true;
-    wound = {body.name, led->origin, led->x_axis, led->y_axis, Vec2::Zero(), Vec2::Zero(), 0};
-    extend(wound, least, most);
-  }
-  if (!(least.x() <= most.x())) return true;
-  Vec2 from = least - Vec2::Constant(margin), to = most + Vec2::Constant(margin);
-  if (!ends) (along ? to : from).x() = along ? most.x() : least.x();
-  if (goes_on && ends) {  // as a whole: it may part the body now
-    from = from.cwiseMin(wound.least);
-    to = to.cwiseMax(wound.most);
-  } else if (goes_on) {  // from where it ends
-    if (along)
-      from.x() = least.x() < wound.least.x() ? from.x() : std::min(wound.most.x(), least.x());
-    else
-      to.x() = most.x() > wound.most.x() ? to.x() : std::max(wound.least.x(), most.x());
-  }
-  wound.least = goes_on ? Vec2(wound.least.cwiseMin(from)) : from;
-  wound.most = goes_on ? Vec2(wound.most.cwiseMax(to)) : to;
-  wound.stroke = instrument.stroke;
-  return cutWound(n, body, wound, from, to, command);
-}
-
-bool World::Impl::cutWound(std::size_t n, WorldBody& body, BladeWound wound, const Vec2& from, const Vec2& to,
-                           const InciseCommand& command) {
-  Instrument& instrument = instruments[n];
-  const Vec2 half = 0.5 * (to - from);
-  const Vec3 origin = wound.origin + from.x() * wound.x_axis + (from.y() + half.y()) * wound.y_axis;
-  const Blade blade = {origin, wound.x_axis, wound.y_axis, 2.0 * half.x(), half.y(), half.y(), 0.0};
-  const std::size_t said = events.size();
-  ++commands;  // each is another one
-  const double toughness = body.material.toughness;
-  stroke_of_cut = (std::uint64_t{instrument.number} + 1) << 32 | instrument.stroke;
-  const Result<InciseReply> made = inciseNow(command, &blade);
-  stroke_of_cut = 0;
-  if (!made) {  // all of it is open; what is refused is made with the next
-    BladeWound* const known = woundOf(instrument, wound.body);
-    if (known && made.error().code == ErrorCode::kUnsuitableShape) *known = wound;
-    return true;
-  }
-  instrument.owed += toughness * made->opened_area;
-  std::vector<BladeWound>& wounds = instrument.wounds;
-  wounds.erase(std::remove_if(wounds.begin(), wounds.end(),
-                              [&](const BladeWound& of) { return of.body == wound.body || !find(of.body); }),
-               wounds.end());
-  std::vector<std::string> names = made->new_bodies;  // pieces keep the frame of rest
-  if (names.empty()) names = {wound.body};
-  for (const std::string& name : names) {
-    wound.body = name;
-    if (wounds.size() < kMostWounds) wounds.push_back(wound);
-  }
-  for (std::size_t e = said; e < events.size(); ++e)
-    if (events[e].type == EventType::kIncised) events[e].instrument = instrument.def.name;
-  return true;
-}
 void World::Impl::leadInstruments(double h_frame) {
   for (std::size_t n = 0; n < instruments.size(); ++n) {
     Instrument& instrument = instruments[n];
@@ -621,7 +392,7 @@ void World::Impl::feelInstrument(Index island, Index collider, double h, double 
   addLatch(instrument, load);
   instrument.load = load;
   instrument.jaw_torque += share * instrument.cut_torque;
-  instrument.force += share * load.force;
+  instrument.force += share * (load.force + instrument.cut_force);
   instrument.torque += share * load.torque;
   instrument.jaw_torque += share * load.jaw;
   body.stepped = true;
@@ -638,7 +409,7 @@ void World::Impl::stepFreeInstruments(double h, int parts, int parts_left) {
     instruments[n].force += instruments[n].load.force / parts;
     instruments[n].torque += instruments[n].load.torque / parts;
     advanceInstrument(static_cast<Index>(bodies.size() + obstacles.size() + n), h, parts_left);
-    instruments[n].force += body.blocked / parts;
+    instruments[n].force += (body.blocked + instruments[n].cut_force) / parts;
     instruments[n].jaw_torque += instruments[n].cut_torque / parts;
   }
 }

@@ -146,6 +146,7 @@ std::vector<Row> rows() {
       {"an instrument", "max_speed: 0.8, type: grasper", "type: grasper", READ(instrumentOf(s).max_speed), "0.8"},
       {"an instrument", "grasp: latch, type: grasper", "type: grasper", READ(instrumentOf(s).latch), "1"},
       {"an instrument", "grip: 4, type: grasper", "type: grasper", READ(instrumentOf(s).grip), "4"},
+      {"an instrument", "sharpness: 0.4, type: scalpel", "type: scalpel", READ(instrumentOf(s).sharpness), "0.4"},
 
       {"an attachment", "bodies: [b, a], stiffness: 1, distance: 1", "bodies: [a, b], stiffness: 1, distance: 1",
        READ(attachmentOf(s).body, attachmentOf(s).other), "b a"},

@@ -12,8 +12,9 @@
 namespace meshless {
 
 /// A rod with a round tip; two jaws on a hinge; a rod whose tip is bent aside, to +y; two blades on a hinge that slide
-/// along each other, the upper one on the side of +z; two jaws that leave a clip on what they close on.
-enum class InstrumentType { kProbe, kGrasper, kHook, kScissors, kClipApplier };
+/// along each other, the upper one on the side of +z; two jaws that leave a clip on what they close on; a blade in the
+/// plane of x and y, whose edge is on the side of -y.
+enum class InstrumentType { kProbe, kGrasper, kHook, kScissors, kClipApplier, kScalpel };
 const char* toString(InstrumentType type);
 
 /// What a user chose. The hand is an impedance: a spring and a damper draw the instrument to where it is wanted, by no
@@ -24,7 +25,7 @@ struct InstrumentDef {
   Pose pose;                          // of the tip, where it begins
   double shaft_radius = 0.0025;       // [m]
   double shaft_length = 0.3;          // [m]
-  double jaw_length = 0.018;          // [m] from hinge to tip; of a hook: how far it reaches aside
+  double jaw_length = 0.018;          // [m] from hinge to tip, or of a blade; of a hook: how far it reaches aside
   double jaw_width = 0.004;           // [m]
   double jaw_thickness = 0.0019;      // [m] of each
   double friction = 0.5;              // Coulomb, combined with the tissue's as that of two bodies
@@ -36,11 +37,17 @@ struct InstrumentDef {
   double max_torque = 0.5;            // [N m]
   double max_speed = 1.0;             // [m/s] of the hand: a pose farther away is gone to at this
   double grip = 5.0;                  // [N] of each jaw, in its middle
+  double sharpness = 1.0;             // of a scalpel: the tissue's toughness over what it takes [J/m^2] (a sharp one: 1)
   bool latch = false;  // of a grasper: what its jaws have grasped stays in them, by a spring, until they open
   std::optional<Vec3> remote_centre;  // [m] of a trocar, through which the shaft goes
   Color color{0.75f, 0.78f, 0.82f, 1.0f};
 
-  bool hasJaws() const { return type != InstrumentType::kProbe && type != InstrumentType::kHook; }
+  bool hasJaws() const {
+    return type == InstrumentType::kGrasper || type == InstrumentType::kScissors || type == InstrumentType::kClipApplier;
+  }
+  /// [m] of a scalpel: where its edge ends, which begins at the tip.
+  Vec3 heel() const { return {-jaw_length, -0.5 * jaw_width, 0.0}; }
+  Vec3 ahead() const { return Vec3(-heel().y(), heel().x(), 0.0).normalized(); }  // unit: where the edge faces
   double jawEdge() const;       // [m] of the triangles of a jaw
   double bladeOverlap() const;  // [m] by which the edges of closed blades are past the middle
   double bladeReach() const;    // [m] the same of where they cut
@@ -55,7 +62,7 @@ struct InstrumentNumber {
   double least, most;
   const char* unit;
 };
-extern const std::array<InstrumentNumber, 14> kInstrumentNumbers;
+extern const std::array<InstrumentNumber, 15> kInstrumentNumbers;
 
 /// It names topics and a tf frame.
 bool isInstrumentName(const std::string& name);
@@ -70,11 +77,12 @@ constexpr double kFarthestHand = 1e3;  // [m] of a pose from the origin
 struct InstrumentShape {
   enum Part : std::uint8_t { kShaft, kUpperJaw, kLowerJaw };  // the upper one is turned to +y
   TriangleMesh mesh;
+  Points edge;                      // [m] of a scalpel: the ground and obstacles stop these, tissue does not
   std::vector<std::uint8_t> parts;  // one a vertex
   Vec3 hinge = Vec3::Zero();        // [m]
   double thickness = 0.0;           // [m] of what is thinnest
 
-  /// Where its vertices are [m], of an instrument there, open by `jaw` [rad].
+  /// Where its vertices are [m], and after them the edge, of an instrument there, open by `jaw` [rad].
   void place(const Pose& pose, double jaw, Points& vertices) const;
 };
 InstrumentShape shapeOf(const InstrumentDef& def);
@@ -89,7 +97,8 @@ struct InstrumentLoad {
   double jaw_inertia = 0.0;    // [kg m^2] of that for the angle between the jaws
 };
 
-/// A wound that blades make, snip by snip: in one plane of the body at rest.
+/// A wound that blades make, snip by snip: in one plane of the body at rest. Of a scalpel: the last snip, which begins
+/// where x is 0.
 struct BladeWound {
   std::string body;
   Vec3 origin = Vec3::Zero();                           // [m]
@@ -120,7 +129,10 @@ struct Instrument {
   double jaw_stop = 0.0;                              // [rad] they close no further
   double cut_to = 0.0;             // [m] from the hinge to which blades have cut what is between them
   std::vector<BladeWound> wounds;  // that they may go on with, one a body
-  std::uint32_t stroke = 0;        // how often they have opened
+  std::uint32_t stroke = 0;        // how often they have opened, or an edge has left tissue
+  bool in_tissue = false;          // the edge of a scalpel
+  Pose edge_at;                    // where it has cut to
+  Vec3 cut_force = Vec3::Zero();   // [N] of what it cuts on it, in the last substep
   double resists = 0.0;            // [N] of what they cut next: toughness times thickness
   double cut_torque = 0.0;         // [N m] of that on the jaws in the last substep
   double cut_work = 0.0;           // [J] of that since the last snip
