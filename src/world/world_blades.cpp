@@ -12,6 +12,7 @@ namespace {
 constexpr double kSnip = 0.125;     // of blades: they have closed on so much more before it is cut, or close no further
 constexpr double kJoins = 3e-4;     // [m] by which a snip goes over the last one, and beyond tissue
 constexpr double kStands = 2e-3;    // [m/s] an edge that is slower cuts at once
+constexpr double kRests = 1e-6;     // [m/s] slower blades stand
 constexpr double kGoesOn = 0.8;     // cosine: blades turned less go on with the wound of an earlier stroke
 constexpr double kJustAhead = 0.1;  // of the way between two: the first line of an edge, ahead of what it has cut
 constexpr int kMostLines = 100;

@@ -263,7 +263,7 @@ class RecordingPageTest(PageTestCase):
         number = re.search(r'hash \w+', said).group()
         sizes = {name: 1e-6 * os.path.getsize(os.path.join(self.folder, 'home', 'meshless_surgery', name)) for name in ('monday', 'monday.index')}
         print('MB: %s' % sizes)
-        start = float(re.search(r'scene `liver` ([\d.]+) MB', self.page).group(1))
+        start = float(re.search(r'([\d.]+) MB for the\s+scene `liver`', self.page).group(1))
         self.assertAlmostEqual(start, sizes['monday'], delta=0.2 * start)
         self.assertGreater(sizes['monday.index'], 0.0)
         replayed = self.good(self.command('rosrun meshless_surgery replay'))
