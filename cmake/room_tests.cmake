@@ -66,7 +66,7 @@ endfunction()
 
 # The shares in which a room's cases run: more than one where they take long.
 set(shares_stress 6)
-set(shares_world 4)
+set(shares_world 6)
 set(shares_accuracy 4)
 set(shares_geometry 3)
 set(shares_body 2)
