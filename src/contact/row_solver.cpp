@@ -193,14 +193,50 @@ class Solver {
     push(bodies_[active.b], active.on_b, impulse);
   }
 
-  /// The last impulse, as far as it presses along the normal of now.
-  void warmStart(const Active& active, double share) {
-    ContactRow& row = *active.row;
-    if (active.target > 0.0 || !(row.normal.dot(row.impulse) > 0.0))
-      row.impulse.setZero();
-    else
-      row.impulse *= share;
-    if (!row.impulse.isZero(0.0)) push(active, row.impulse);
+  /// The last impulses, as far as they press along the normal of now. Of rows of a body with itself what of them leaves
+  /// the least energy: shreds in a tangle go many times as far as their rows are long, and sweeps would not take back
+  /// what rows that come and go give them.
+  void warmStart(double share) {
+    for (const Active& active : scratch_.active) {
+      ContactRow& row = *active.row;
+      if (active.target > 0.0 || !(row.normal.dot(row.impulse) > 0.0))
+        row.impulse.setZero();
+      else
+        row.impulse *= share;
+    }
+    const Active *const all = scratch_.active.data(), *const last = all + scratch_.active.size();
+    for (const Active *begin = all, *end = all; begin != last; begin = end) {
+      while (end != last && end->rows == begin->rows) ++end;
+      warmStart(begin, end, begin->rows->a == begin->rows->b);
+    }
+  }
+
+  void warmStart(const Active* begin, const Active* end, bool within) {
+    const auto worked = [&] {  // [kg m^2]
+      double sum = 0.0;
+      for (const Active* active = begin; active != end; ++active)
+        if (!active->row->impulse.isZero(0.0)) sum += active->row->impulse.dot(beyond(*active));
+      return sum;
+    };
+    const auto give = [&](double share) {
+      for (const Active* active = begin; active != end; ++active)
+        if (!active->row->impulse.isZero(0.0)) push(*active, share * active->row->impulse);
+    };
+    const double before = within ? worked() : 0.0;
+    give(1.0);
+    const double after = within ? worked() : 0.0;
+    if (!(after > 0.0)) return;
+    // A share s of them gives h^-2 (s before + s^2 (after - before) / 2).
+    const double best = std::max(0.0, -before / (after - before));
+    give(best - 1.0);
+    for (const Active* active = begin; active != end; ++active) active->row->impulse *= best;
+  }
+
+  /// [m] how far a row is from what it asks for: along the normal the target, across it the start.
+  Vec3 beyond(const Active& active) const {
+    const ContactRow& row = *active.row;
+    const double from = row.normal.dot(active.start) + row.constant - active.target;
+    return sum(active, false) + moved(active) - active.start + from * row.normal;
   }
 
   /// [kg^2 m^2] what is new of its impulse, squared.
@@ -495,10 +531,8 @@ inline void solve(const std::vector<SolverRows>& sets, std::vector<SpringRow>& s
   for (FibreRow& fibre : fibres) solver.activate(fibre, step);
   counters.fibres += fibres.size();
   counters.active += scratch.active.size();
-  for (const auto& active : scratch.active) {
-    counters.ground += active.row->kind == FeaturePair::Kind::kPlane;
-    solver.warmStart(active, step.warm);
-  }
+  for (const auto& active : scratch.active) counters.ground += active.row->kind == FeaturePair::Kind::kPlane;
+  solver.warmStart(step.warm);
   // Contacts have the last word. Always in the same order: in turns, what the last impulses leave over changes from
   // substep to substep, and stacks of stiff bodies sway.
   for (int sweep = 0; sweep < kSweeps; ++sweep) {

@@ -144,7 +144,7 @@ TEST(ScalpelInHand, LeavesOneWoundHoweverItIsHeld) {
     Random random(seed);
     World world{test::weightless()};
     ASSERT_TRUE(world.addSceneBody(test::shared(block(random.between(0.003, 0.006)))).ok());
-    const double lean = random.between(-0.1, 0.9), depth = random.between(0.003, 0.008);
+    const double lean = random.between(-0.1, 0.6), depth = random.between(0.003, 0.008);
     const double bend = seed % 2 ? 0.0 : random.between(-1.0, 1.0);  // [rad] over all of the way
     const double tremble = random.between(0.0, 3e-4);                // [m]
     const double in = 0.5 * kSize.z() - depth;

@@ -327,7 +327,8 @@ void strokesIn(std::uint64_t seed) {
 }
 
 TEST(ScissorsInHand, StrokesAllOverRandomOrgansLoseNothing) {
-  for (std::uint64_t seed = 1; seed < 3; ++seed) {
+  // Of the last one shreds got tangled, and were thrown about.
+  for (const std::uint64_t seed : {1, 2, 21847}) {
     SCOPED_TRACE(seed);
     strokesIn(seed);
   }
