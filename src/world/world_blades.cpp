@@ -4,6 +4,7 @@
 
 #include "line_search.h"
 #include "meshless_surgery/body/cut_body.h"
+#include "meshless_surgery/geometry/mesh/measures.h"
 #include "world_impl.h"
 
 namespace meshless {
@@ -356,12 +357,16 @@ World::Impl::EdgeIs World::Impl::sweepEdge(std::size_t n, WorldBody& body, bool 
     from = from.cwiseMin(wound.within(p));
     to = to.cwiseMax(wound.within(p));
   }
-  if (!through) {  // what it opens is as deep as the edge was in the mean
+  const double back = turns ? kJoins : margin;  // [m] over the last snip
+  if (!through) {                               // what it opens is as deep as the edge was in the mean
     double sum = 0.0;
     for (const Vec3& p : deepest) sum += wound.within(p).y();
     from.y() = sum / static_cast<double>(deepest.size());
+    // Nor deeper where it goes back over the last snip, and the tip came from above.
+    const Vec2 tip_way = wound.within(deepest.back()) - wound.within(deepest.front());
+    if (goes_on && tip_way.x() > kJoins && tip_way.y() < 0.0) from.y() -= tip_way.y() / tip_way.x() * back;
   }
-  from.x() = (goes_on ? std::min(from.x(), 0.0) : from.x()) - (turns ? kJoins : margin);
+  from.x() = (goes_on ? std::min(from.x(), 0.0) : from.x()) - back;
   if (ends || next.empty()) to.x() += margin;
   const Vec2 end = wound.within(middle);
   wound.origin += end.x() * wound.x_axis + end.y() * wound.y_axis;

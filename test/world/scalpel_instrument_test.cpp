@@ -116,8 +116,7 @@ std::size_t pieces(World& world) { return world.snapshot({}).bodies.size(); }
 // A stroke of 10 cm: one wound as deep and as long as the tip has gone, for the toughness of its area.
 TEST(ScalpelInHand, LeavesOneWoundForTheToughnessOfItsArea) {
   constexpr double kDepth = 0.006;
-  for (const auto& [edge, speed] :
-       std::vector<std::array<double, 2>>{{0.006, 0.05}, {0.004, 0.1}, {0.003, 0.05}}) {
+  for (const auto& [edge, speed] : std::vector<std::array<double, 2>>{{0.006, 0.05}, {0.004, 0.1}, {0.003, 0.05}}) {
     SCOPED_TRACE(testing::Message() << edge << " m, " << speed << " m/s");
     World world{test::weightless()};
     ASSERT_TRUE(world.addSceneBody(test::shared(block(edge))).ok());
@@ -139,12 +138,12 @@ TEST(ScalpelInHand, LeavesOneWoundForTheToughnessOfItsArea) {
 
 // However the blade leans, along straight ways and curved ones, and where the hand trembles.
 TEST(ScalpelInHand, LeavesOneWoundHoweverItIsHeld) {
-  for (std::uint64_t seed = 1; seed < 4; ++seed) {
+  for (std::uint64_t seed = 1; seed < 8; ++seed) {
     SCOPED_TRACE(seed);
     Random random(seed);
     World world{test::weightless()};
     ASSERT_TRUE(world.addSceneBody(test::shared(block(random.between(0.003, 0.006)))).ok());
-    const double lean = random.between(-0.1, 0.6), depth = random.between(0.003, 0.008);
+    const double lean = random.between(-0.1, seed % 2 ? 0.9 : 0.5), depth = random.between(0.003, 0.008);
     const double bend = seed % 2 ? 0.0 : random.between(-1.0, 1.0);  // [rad] over all of the way
     const double tremble = random.between(0.0, 3e-4);                // [m]
     const double in = 0.5 * kSize.z() - depth;
@@ -168,11 +167,11 @@ TEST(ScalpelInHand, LeavesOneWoundHoweverItIsHeld) {
     EXPECT_EQ(pieces(world), 1u);
     EXPECT_EQ(opened.wounds, 1);
     EXPECT_NEAR(hand.felt, kToughness * opened.area, 0.03 * kToughness * opened.area);
-    // Blades that lean and turn open up to a fifth more: flat snips overlap.
+    // Blades that turn open up to a fifth more, as flat snips overlap; of those that lean snips end in steps.
     const double way = 0.08 * (1.0 + bend * bend / 24.0), share = opened.area / (way * depth);
     EXPECT_GT(share, 0.97);
-    EXPECT_LT(share, bend == 0.0 ? 1.05 : 1.25);
-    EXPECT_NEAR(opened.deepest, depth, bend == 0.0 ? 5e-4 : 2e-3);
+    EXPECT_LT(share, bend == 0.0 ? 1.05 : 1.2);
+    EXPECT_NEAR(opened.deepest, depth, bend == 0.0 ? 5e-4 + 1.5e-3 * std::abs(lean) : 2e-3);
   }
 }
 
