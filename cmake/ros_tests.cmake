@@ -27,7 +27,7 @@ if(test_scripts)
 endif()
 
 # For scripts/check --full: what takes long for what it adds.
-set(full_tests clip devices display ending forces fuzz hands network own_organ own_package pages parameters play_abdomen play_block play_fish play_incision play_liver_looks play_peg_transfer play_pile play_resection
+set(full_tests camera_by_mouse clip devices display ending forces fuzz hands lead network own_organ own_package pages parameters play_abdomen play_block play_fish play_incision play_liver_looks play_peg_transfer play_pile play_resection
   play_skin requests robust scenes session shown_block shown_fish shown_review shown_skin soak stations)
 # A node keeps one processor busy, and a screen is drawn by software: tests run alone. These wait for what they ask for,
 # however long it takes, or hold the clock themselves.

@@ -297,9 +297,9 @@ Vec3 readDirection(YamlSource& source, const YAML::Node& node) {
 InstrumentDef readInstrument(YamlSource& source, const YAML::Node& node) {
   InstrumentDef def;
   YamlMap map(source, node, "an instrument");
-  const int type = map.choice("type", {"probe", "grasper", "hook", "scissors", "clip_applier", "scalpel"});
+  const int type = map.choice("type", {"probe", "grasper", "hook", "scissors", "clip_applier", "scalpel", "endoscope"});
   if (!map.has("type"))
-    source.fail(node, "an instrument has no type", "probe, grasper, hook, scissors, clip_applier, scalpel");
+    source.fail(node, "an instrument has no type", "probe, grasper, hook, scissors, clip_applier, scalpel, endoscope");
   def.type = static_cast<InstrumentType>(std::max(0, type));
   if (const YAML::Node pose = map.get("pose"); pose.IsDefined()) def.pose = readPose(source, pose);
   for (const InstrumentNumber& number : kInstrumentNumbers)

@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <regex>
 
+#include "meshless_surgery/base/number_text.h"
 #include "opened_file.h"
 #include "region_yaml.h"
 
@@ -314,7 +315,7 @@ class TaskReader {
   void readStage(const YAML::Node& node) {
     const std::vector<std::string> kinds{"reach",     "stretch_to",    "press_to", "cut_along", "separate",
                                          "remove_to", "leave_nothing", "let_go",   "clip",      "hold",
-                                         "hand_over", "put_back",      "put_on"};
+                                         "hand_over", "put_back",      "put_on",   "see"};
     Stage stage;
     YamlMap map(source_, node, "a stage");
     map.text("name", stage.name);
@@ -406,6 +407,16 @@ class TaskReader {
       readNames(map, node, "obstacles", "names of obstacles", put.obstacles);
       put.handed_over = map.choice("handed_over", {"false", "true"}) == 1;
       condition = put;
+    } else if (kind == "see") {
+      See see;
+      readBody(map, node, kind, see.body);
+      map.number("off_centre", {0.0, 1.0, true}, see.off_centre);
+      map.number("fills_least", {0.0, 1.0, true}, see.fills_least);
+      map.number("fills_most", {0.0, 1.0, true}, see.fills_most);
+      if (!source_.fault && !(see.fills_least < see.fills_most))
+        source_.fail(node, "fills_least is " + numberText(see.fills_least),
+                     "below fills_most, " + numberText(see.fills_most));
+      condition = see;
     } else {
       LeaveNothing leave;
       map.number("share", {0.0, 0.99}, leave.share);

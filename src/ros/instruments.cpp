@@ -74,7 +74,8 @@ std::vector<Part> Instruments::parts(const WorldSnapshot& snapshot, const std::o
     const InstrumentDef& def = instrument.def;
     const double size = def.shaft_radius / kShaftRadius, turn = 0.5 * M_PI;
     const auto placed = [&](const Vec3& at) { return Pose{instrument.pose.rotation, instrument.pose * at}; };
-    if (def.type == InstrumentType::kProbe) parts.push_back(part("shaft", instrument.pose, size));
+    if (def.type == InstrumentType::kProbe || def.type == InstrumentType::kEndoscope)
+      parts.push_back(part("shaft", instrument.pose, size));
     if (def.type == InstrumentType::kHook) {
       const Pose aside = placed(Vec3(-def.shaft_radius, 0.0, 0.0));
       parts.push_back(part("shaft", placed(Vec3(0.0, -def.jaw_length, 0.0)), size));

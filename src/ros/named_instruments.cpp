@@ -210,6 +210,11 @@ void NamedInstruments::publish(const WorldSnapshot& snapshot, const ros::Time& s
     transform.transform.translation = toVector(instrument.pose.translation);
     transform.transform.rotation = toQuaternion(instrument.pose.rotation);
     if (transform.child_frame_id != header.frame_id) transforms.push_back(transform);
+    if (instrument.def.type == InstrumentType::kEndoscope) {
+      transform.child_frame_id += "/view";
+      transform.transform.rotation = toQuaternion(sightOf(instrument.def, instrument.pose).rotation);
+      transforms.push_back(transform);
+    }
 
     CrtkOperatingState state;
     state.header = header;
@@ -224,9 +229,14 @@ void NamedInstruments::publish(const WorldSnapshot& snapshot, const ros::Time& s
           topics.alive && settings_.tools_silence > 0.0 && clock_.now() - topics.heard > settings_.tools_silence;
       if (fell_silent) topics.alive = false;
     }
-    if (fell_silent)
-      ROS_WARN_STREAM("instrument " << name << ": its stream was silent for " << numberText(settings_.tools_silence)
-                                    << " s; it stays where it is and lets go of nothing");
+    if (fell_silent) {
+      const std::string said = "instrument " + name + ": its stream was silent for " +
+                               numberText(settings_.tools_silence) + " s; it stays where it is and lets go of nothing";
+      if (instrument.holds.empty())
+        ROS_INFO_STREAM(said);
+      else
+        ROS_WARN_STREAM(said);
+    }
     state.is_busy = busy && !fault ? 1 : 0;
     if (state.state == topics.said_state && (state.is_busy != 0) == topics.said_busy) continue;
     topics.said_state = state.state;

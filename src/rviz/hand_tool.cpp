@@ -1,5 +1,6 @@
 #include "hand_tool.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -19,8 +20,9 @@
 namespace meshless {
 namespace {
 
-constexpr double kProbeEvery = 0.2;  // [s] under a cursor that stands still: the tissue moves
-constexpr double kNoteTime = 4.0;    // [s]
+constexpr double kProbeEvery = 0.2;     // [s] under a cursor that stands still: the tissue moves
+constexpr double kNoteTime = 4.0;       // [s]
+constexpr double kNearestPlane = 0.05;  // [m] before the camera
 constexpr char kClearKey = 'R';
 
 }  // namespace
@@ -86,13 +88,13 @@ void HandTool::update(float wall_dt, float) {
 int HandTool::processMouseEvent(rviz::ViewportMouseEvent& event) {
   if (panel_ != event.panel) listenTo(event.panel);
   viewport_ = event.viewport;
+  last_x_ = seen_ ? x_ : event.x;
+  last_y_ = seen_ ? y_ : event.y;
   x_ = event.x;
   y_ = event.y;
   seen_ = true;
   moved_ = true;
-  ray_ = viewport_->getCamera()->getCameraToViewportRay(
-      static_cast<float>(x_) / static_cast<float>(viewport_->getActualWidth()),
-      static_cast<float>(y_) / static_cast<float>(viewport_->getActualHeight()));
+  ray_ = rayThrough(x_, y_);
   if (!onMouse(event) && panel_->getViewController()) panel_->getViewController()->handleMouseEvent(event);
   showCursor();
   showStatus();
@@ -199,6 +201,23 @@ Ogre::Quaternion HandTool::instrumentTurn() const {
 Ogre::Vector3 HandTool::onPlane(const Ogre::Vector3& normal, const Ogre::Vector3& point) const {
   const auto met = ray_.intersects(Ogre::Plane(normal, point));
   return met.first ? ray_.getPoint(met.second) : point;
+}
+
+Ogre::Ray HandTool::rayThrough(int x, int y) const {
+  return viewport_->getCamera()->getCameraToViewportRay(
+      static_cast<float>(x) / static_cast<float>(viewport_->getActualWidth()),
+      static_cast<float>(y) / static_cast<float>(viewport_->getActualHeight()));
+}
+
+Ogre::Vector3 HandTool::cursorWay(const Ogre::Vector3& place) const {
+  if (!viewport_) return Ogre::Vector3::ZERO;
+  const Ogre::Vector3 eye = viewport_->getCamera()->getDerivedPosition(), ahead = viewDirection();
+  const double away = std::max(kNearestPlane, static_cast<double>((place - eye).dotProduct(ahead)));
+  const Ogre::Plane plane(ahead, eye + ahead * static_cast<float>(away));
+  const Ogre::Ray from = rayThrough(last_x_, last_y_), to = rayThrough(x_, y_);
+  const auto was = from.intersects(plane), is = to.intersects(plane);
+  return was.first && is.first ? to.getPoint(is.second) - from.getPoint(was.second)
+                               : Ogre::Vector3(Ogre::Vector3::ZERO);
 }
 
 double HandTool::pixelsTo(const Ogre::Vector3& point) const {

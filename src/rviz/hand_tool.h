@@ -84,6 +84,12 @@ class HandTool : public rviz::Tool {
   Ogre::Quaternion instrumentTurn() const;
   /// The cursor's ray and the plane through `point` that faces along `normal`; `point` where they do not meet.
   Ogre::Vector3 onPlane(const Ogre::Vector3& normal, const Ogre::Vector3& point) const;
+  /// Of the cursor since the event before [px].
+  int pixelsRight() const { return x_ - last_x_; }
+  int pixelsDown() const { return y_ - last_y_; }
+  /// The same in the plane through a place that faces the camera as it is now; in one before the camera where the
+  /// place is at it, as it is where the camera goes along.
+  Ogre::Vector3 cursorWay(const Ogre::Vector3& place) const;
   /// Distance on the screen between the cursor and a point; infinite where it is behind the camera.
   double pixelsTo(const Ogre::Vector3& point) const;
   geometry_msgs::PoseStamped poseMessage(const Ogre::Vector3& position,
@@ -104,6 +110,7 @@ class HandTool : public rviz::Tool {
 
  private:
   void listenTo(rviz::RenderPanel* panel);
+  Ogre::Ray rayThrough(int x, int y) const;
   void probe();
   void showCursor();
 
@@ -115,7 +122,7 @@ class HandTool : public rviz::Tool {
   std::string world_frame_;  // of the node; empty until it is known
   Ogre::Ray ray_;
   Ogre::Viewport* viewport_ = nullptr;
-  int x_ = 0, y_ = 0;  // of the cursor [px]
+  int x_ = 0, y_ = 0, last_x_ = 0, last_y_ = 0;  // of the cursor [px], and of the event before
   bool active_ = false;
   bool seen_ = false;         // the cursor is in the view, so that there is a ray
   bool probing_ = false;      // one question at a time

@@ -19,6 +19,7 @@ constexpr double kTurnSpeed = 50.0;    // [rad/s] likewise
 constexpr double kJawTime = 0.01;      // [s] in which a jaw gives way to what it cannot hold
 constexpr double kPivot = 1e-3;        // [m] of the tip from a trocar: nearer it has no direction
 constexpr double kFarthestPose = 1e6;  // [m]
+constexpr double kNoUp = 1e-6;         // [rad] of a line of sight from the vertical
 constexpr double kMostPoints = 20000.0;
 constexpr double kJawYield = 0.05;  // [rad] by which the hand closes more than the jaws for all of their grip
 
@@ -104,7 +105,7 @@ void aimFrom(const Vec3& centre, Pose& pose) {
 
 }  // namespace
 
-const std::array<InstrumentNumber, 15> kInstrumentNumbers{
+const std::array<InstrumentNumber, 17> kInstrumentNumbers{
     {{"shaft_radius", &InstrumentDef::shaft_radius, 1e-4, 0.1, "m"},
      {"shaft_length", &InstrumentDef::shaft_length, 1e-3, 10.0, "m"},
      {"jaw_length", &InstrumentDef::jaw_length, 1e-3, 1.0, "m"},
@@ -119,7 +120,9 @@ const std::array<InstrumentNumber, 15> kInstrumentNumbers{
      {"max_torque", &InstrumentDef::max_torque, 1e-4, 1e3, "N m"},
      {"max_speed", &InstrumentDef::max_speed, 1e-3, 5.0, "m/s"},
      {"grip", &InstrumentDef::grip, 0.01, 1e3, "N"},
-     {"sharpness", &InstrumentDef::sharpness, 0.01, 1.0, ""}}};
+     {"sharpness", &InstrumentDef::sharpness, 0.01, 1.0, ""},
+     {"view_angle", &InstrumentDef::view_angle, 0.0, 1.57, "rad"},
+     {"field_of_view", &InstrumentDef::field_of_view, 0.1, 2.6, "rad"}}};
 
 const char* toString(InstrumentType type) {
   switch (type) {
@@ -135,6 +138,8 @@ const char* toString(InstrumentType type) {
       return "clip_applier";
     case InstrumentType::kScalpel:
       return "scalpel";
+    case InstrumentType::kEndoscope:
+      return "endoscope";
   }
   return "unknown";
 }
@@ -209,7 +214,8 @@ InstrumentShape shapeOf(const InstrumentDef& def) {
     shape.parts.resize(shape.mesh.vertices.size(), part);
   };
   shape.thickness = 2.0 * def.shaft_radius;
-  if (def.type == InstrumentType::kProbe) add(capsule(-def.shaft_length, def.shaft_radius), InstrumentShape::kShaft);
+  if (def.type == InstrumentType::kProbe || def.type == InstrumentType::kEndoscope)
+    add(capsule(-def.shaft_length, def.shaft_radius), InstrumentShape::kShaft);
   if (def.type == InstrumentType::kHook) {
     // The tip is where the hook points; its shaft ends beside it.
     const Vec3 elbow(0.0, -def.jaw_length, 0.0);
@@ -235,6 +241,16 @@ InstrumentShape shapeOf(const InstrumentDef& def) {
     add(moved(jaw, {Quat::Identity(), Vec3(middle.x(), -middle.y(), -middle.z())}), InstrumentShape::kLowerJaw);
   }
   return shape;
+}
+
+Pose sightOf(const InstrumentDef& def, const Pose& pose) {
+  Mat3 axes;
+  const Vec3 along = pose.rotation * Vec3(std::cos(def.view_angle), 0.0, -std::sin(def.view_angle));
+  const Vec3 left = Vec3::UnitZ().cross(along);
+  axes.col(0) = along;
+  axes.col(1) = left.norm() > kNoUp ? left.normalized() : Vec3(pose.rotation * Vec3::UnitY());
+  axes.col(2) = along.cross(axes.col(1));
+  return {Quat(axes).normalized(), pose.translation};
 }
 
 Pose Instrument::handAfter(double h) const {

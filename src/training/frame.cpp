@@ -7,6 +7,7 @@
 #include <Eigen/Eigenvalues>
 
 #include "meshless_surgery/geometry/mesh/measures.h"
+#include "meshless_surgery/tools/grasp.h"
 
 namespace meshless {
 namespace {
@@ -154,6 +155,33 @@ std::vector<std::string> aroundWhat(const WorldSnapshot& shot, const BodySnapsho
   return names;
 }
 
+// Where a body is in the picture of an endoscope.
+TrainingFrame::Shown shownBy(const Instrument& endoscope, const BodySnapshot& body, const WorldSnapshot& shot) {
+  TrainingFrame::Shown shown;
+  shown.body = body.name;
+  const Pose sight = sightOf(endoscope.def, endoscope.pose);
+  const Box box = boundsOf(body.surface);
+  const Vec3 middle = 0.5 * (box.min + box.max), way = middle - sight.translation;
+  double radius = 0.0;
+  for (const Vec3& p : body.surface) radius = std::max(radius, (p - middle).norm());
+  const double distance = way.norm(), half = 0.5 * endoscope.def.field_of_view;
+  const Vec3 along = sight.rotation * Vec3::UnitX();
+  shown.off_centre = std::atan2(along.cross(way).norm(), along.dot(way)) / half;
+  shown.fills = distance > radius ? std::asin(radius / distance) / half : std::numeric_limits<double>::infinity();
+  const auto meets = [&](const Points& vertices, const std::vector<Triangle>& triangles) {
+    const RayHit hit = castRay(vertices, triangles, sight.translation, way);
+    return hit.hit && hit.distance < distance;
+  };
+  shown.hidden =
+      std::any_of(shot.bodies.begin(), shot.bodies.end(),
+                  [&](const BodySnapshot& other) {
+                    return other.number != body.number && meets(other.surface, other.model->surface.triangles);
+                  }) ||
+      std::any_of(shot.obstacles.begin(), shot.obstacles.end(),
+                  [&](const auto& obstacle) { return meets(obstacle->mesh.vertices, obstacle->mesh.triangles); });
+  return shown;
+}
+
 TrainingFrame frameOf(World& world, std::vector<Event> events, const FrameWants& wants) {
   TrainingFrame frame;
   SnapshotWants parts;
@@ -161,7 +189,8 @@ TrainingFrame frameOf(World& world, std::vector<Event> events, const FrameWants&
   frame.centres = frame.sampled && wants.centres;
   frame.places = frame.sampled && !wants.placed.empty();
   parts.particles = frame.centres || (frame.sampled && wants.strains);
-  parts.surfaces = frame.places;
+  frame.pictures = frame.sampled && !wants.seen.empty();
+  parts.surfaces = frame.places || frame.pictures;
   parts.touches = !wants.placed.empty();
   const WorldSnapshot shot = world.snapshot(parts);
   frame.step = shot.step;
@@ -193,6 +222,10 @@ TrainingFrame frameOf(World& world, std::vector<Event> events, const FrameWants&
     const Vec3 end = of.pose * Vec3(-of.def.shaft_length - (of.def.hasJaws() ? of.def.jaw_length : 0.0), 0.0, 0.0);
     frame.tools.push_back({ToolKind::kInstrument, of.number, false, of.holds, of.pose.translation, of.pose.rotation,
                            end, of.def.shaft_radius, of.force.norm(), of.pose.translation});
+    if (!frame.pictures || of.def.type != InstrumentType::kEndoscope) continue;
+    for (const BodySnapshot& body : shot.bodies)
+      if (std::find(wants.seen.begin(), wants.seen.end(), body.name) != wants.seen.end())
+        frame.tools.back().shown.push_back(shownBy(of, body, shot));
   }
   for (const BodySnapshot& body : shot.bodies) {
     frame.bodies.push_back({body.name, body.number, body.model, body.placed, Vec3::Zero()});

@@ -213,6 +213,14 @@ class FaultFinder {
     return std::nullopt;
   }
 
+  std::optional<TaskFault> check(std::size_t k, const See& see) const {
+    if (auto fault = needsBody("stages", k, see.body)) return fault;
+    if (std::any_of(scene_.instruments.begin(), scene_.instruments.end(),
+                    [](const InstrumentDef& def) { return def.type == InstrumentType::kEndoscope; }))
+      return std::nullopt;
+    return never(k, "the scene has no endoscope", "a scene with an instrument of type endoscope");
+  }
+
   const TaskDef& task_;
   const SceneDef& scene_;
 };
@@ -301,9 +309,17 @@ std::vector<std::string> TaskDef::placed() const {
   return all;
 }
 
+std::vector<std::string> TaskDef::seen() const {
+  std::vector<std::string> all;
+  for (const Stage& stage : stages)
+    if (const auto* see = std::get_if<See>(&stage.condition)) all.push_back(see->body);
+  return all;
+}
+
 std::vector<std::string> TaskDef::bodies() const {
   std::vector<std::string> all = vessels();
   for (const std::string& body : placed()) all.push_back(body);
+  for (const std::string& body : seen()) all.push_back(body);
   if (plan) all.push_back(plan->body);
   if (target) all.push_back(target->body);
   for (const Forbidden& forbidden : limits.measured.forbidden)
@@ -358,6 +374,7 @@ void TaskProgress::feed(const TrainingFrame& frame, const Metrics& metrics, cons
 // What a stage that comes later has to know of now.
 void TaskProgress::watch(const Condition& condition, const TrainingFrame& frame) {
   if (const auto* put = std::get_if<PutOn>(&condition)) watch(*put, frame);
+  if (const auto* see = std::get_if<See>(&condition); see && frame.pictures) watch(*see, frame);
   if (const auto* over = std::get_if<HandOver>(&condition)) {
     Hands& hands = hands_[over->body];
     std::vector<PickId> held = holdersOf(over->body, frame);
@@ -412,6 +429,15 @@ void TaskProgress::watch(const PutOn& put, const TrainingFrame& frame) {
   }
 }
 
+void TaskProgress::watch(const See& see, const TrainingFrame& frame) {
+  in_picture_.erase(&see);
+  for (const TrainingFrame::Tool& tool : frame.tools)
+    for (const TrainingFrame::Shown& shown : tool.shown)
+      if (shown.body == see.body && !shown.hidden && shown.off_centre <= see.off_centre &&
+          shown.fills >= see.fills_least && shown.fills <= see.fills_most)
+        in_picture_.insert(&see);
+}
+
 bool TaskProgress::meets(const PutOn& put) const {
   std::set<std::string> taken;
   for (const std::string& name : put.bodies) {
@@ -437,6 +463,7 @@ bool TaskProgress::meets(const Condition& condition, const TrainingFrame& frame,
              (!press->region || press->region->contains(press->touch ? tool.touch : tool.position));
     });
   if (const auto* put = std::get_if<PutOn>(&condition)) return meets(*put);
+  if (const auto* see = std::get_if<See>(&condition)) return in_picture_.count(see) > 0;
   if (const auto* cut = std::get_if<CutAlong>(&condition)) return tissue.planDone() >= cut->share;
   if (const auto* separate = std::get_if<Separate>(&condition)) {
     const auto has = [](const TrainingFrame::Joint& joint, const std::string& name) {

@@ -48,6 +48,7 @@ FrameWants Training::wants() const {
   wants.centres = now_->tissue.wantsCentres() || task_.wantsCentres();
   wants.strains = task_.wantsStrain();
   wants.placed = task_.placed();
+  wants.seen = task_.seen();
   return wants;
 }
 

@@ -11,7 +11,7 @@
 
 namespace meshless {
 
-constexpr std::uint32_t kStateVersion = 32;
+constexpr std::uint32_t kStateVersion = 33;
 
 inline std::uint32_t checksum(std::string_view bytes) {
   return static_cast<std::uint32_t>(
@@ -114,10 +114,11 @@ MESHLESS_ARCHIVE(Appearance, outer, inner)
 template <class A>
 void serialize(A& archive, Material& v) {
   auto& [name, youngs_modulus, poissons_ratio, stiffening, asymmetry, mode, alpha, beta, density, damping, friction,
-         restitution, toughness, self_contact, volume, area, plasticity, relaxation, fibres, color, inside_color, appearance] = v;
+         restitution, toughness, self_contact, volume, area, plasticity, relaxation, fibres, color, inside_color,
+         appearance] = v;
   archive(name, youngs_modulus, poissons_ratio, stiffening, asymmetry, choice(mode, MatchMode::kQuadratic), alpha, beta,
-          density, damping, friction, restitution, toughness, choice(self_contact, SelfContact::kAll), volume, area, plasticity,
-          relaxation, fibres, color, inside_color, appearance);
+          density, damping, friction, restitution, toughness, choice(self_contact, SelfContact::kAll), volume, area,
+          plasticity, relaxation, fibres, color, inside_color, appearance);
 }
 template <class A>
 void serialize(A& archive, WorldSettings& v) {
@@ -165,18 +166,18 @@ MESHLESS_ARCHIVE(CollisionSurface, mesh, binding, distance)
 /// then.
 template <class A>
 void serialize(A& archive, BodyModel& v) {
-  auto& [rest, masses, fixed, any_fixed, graph, lattice, cell_mass, regions, cells, clamp_points, clamp,
-         held_middles, held_by, tissue, grouping, clusters, shape, match_masses, elastic, elastic_batch, fibre_direction, fibres, specific_fibres, length,
-         specific_stiffness, poissons_ratio, highest_frequency, own, unstressed, surface, texture, binding, collision, cavities, solid, incised, spacing, rest_volume,
-         rest_area, mass, next_patch] = v;
+  auto& [rest, masses, fixed, any_fixed, graph, lattice, cell_mass, regions, cells, clamp_points, clamp, held_middles,
+         held_by, tissue, grouping, clusters, shape, match_masses, elastic, elastic_batch, fibre_direction, fibres,
+         specific_fibres, length, specific_stiffness, poissons_ratio, highest_frequency, own, unstressed, surface,
+         texture, binding, collision, cavities, solid, incised, spacing, rest_volume, rest_area, mass, next_patch] = v;
   (void)elastic_batch, (void)cells, (void)clamp, (void)tissue, (void)cavities;
   auto of_contact = collision ? *collision : CollisionSurface();
   auto of_cells = lattice ? *lattice : CellLattice();
   std::vector<std::uint8_t> held(fixed.begin(), fixed.end());
   archive(of_cells, cell_mass, regions, clamp_points, held_middles, held_by, fibre_direction, fibres, specific_fibres);
   archive(rest, masses, held, any_fixed, graph, grouping, clusters, shape, match_masses, elastic, length,
-          specific_stiffness, poissons_ratio, highest_frequency, own, unstressed, surface, texture, binding, of_contact, solid,
-          incised, spacing, rest_volume, rest_area, mass, next_patch);
+          specific_stiffness, poissons_ratio, highest_frequency, own, unstressed, surface, texture, binding, of_contact,
+          solid, incised, spacing, rest_volume, rest_area, mass, next_patch);
   if constexpr (std::is_same_v<A, InArchive>) {
     if (!of_contact.mesh.vertices.empty()) collision = std::make_shared<CollisionSurface>(std::move(of_contact));
     if (!of_cells.cells.empty()) lattice = std::make_shared<CellLattice>(std::move(of_cells));
@@ -253,15 +254,18 @@ MESHLESS_ARCHIVE(Scissors, shown, blades, angle)
 template <class A>
 void serialize(A& archive, InstrumentDef& v) {
   auto& [name, type, pose, shaft_radius, shaft_length, jaw_length, jaw_width, jaw_thickness, friction, stiffness,
-         damping, angular_stiffness, angular_damping, max_force, max_torque, max_speed, grip, sharpness, latch, remote_centre, color] = v;
-  archive(name, choice(type, InstrumentType::kScalpel), pose, shaft_radius, shaft_length, jaw_length, jaw_width,
+         damping, angular_stiffness, angular_damping, max_force, max_torque, max_speed, grip, sharpness, view_angle,
+         field_of_view, latch, remote_centre, color] = v;
+  archive(name, choice(type, InstrumentType::kEndoscope), pose, shaft_radius, shaft_length, jaw_length, jaw_width,
           jaw_thickness, friction, stiffness, damping, angular_stiffness, angular_damping, max_force, max_torque,
-          max_speed, grip, sharpness, latch, remote_centre, color);
+          max_speed, grip, sharpness, view_angle, field_of_view, latch, remote_centre, color);
 }
 MESHLESS_ARCHIVE(BladeWound, body, origin, x_axis, y_axis, least, most, stroke)
 MESHLESS_ARCHIVE(InstrumentLoad, force, torque, jaw, mass, inertia, jaw_inertia)
-MESHLESS_ARCHIVE(Instrument, def, number, target, jaw_target, hand, jaw_hand, pose, jaw, velocity, spin, jaw_rate, jaw_stop, cut_to, wounds, stroke, in_tissue, edge_at, cut_force, resists, cut_torque, cut_work, owed, answers, load,
-                 force, torque, jaw_torque, holds, gripped, closed_to, loaded, lost_for, latched, latch_at, latch_force)
+MESHLESS_ARCHIVE(Instrument, def, number, target, jaw_target, hand, jaw_hand, pose, jaw, velocity, spin, jaw_rate,
+                 jaw_stop, cut_to, wounds, stroke, in_tissue, edge_at, cut_force, resists, cut_torque, cut_work, owed,
+                 answers, load, force, torque, jaw_torque, holds, gripped, closed_to, loaded, lost_for, latched,
+                 latch_at, latch_force)
 MESHLESS_ARCHIVE(CutCommand, blades, close_time, roughness, bodies)
 MESHLESS_ARCHIVE(ClosingCut, ticket, command, done_at, start_angle, started_at)
 

@@ -7,9 +7,9 @@
 
 #include <gtest/gtest.h>
 
-#include "meshless_surgery/geometry/query/inside.h"
 #include "meshless_surgery/geometry/mesh/measures.h"
 #include "meshless_surgery/geometry/mesh/mesh_check.h"
+#include "meshless_surgery/geometry/query/inside.h"
 #include "support/shapes.h"
 
 namespace meshless {
@@ -185,6 +185,21 @@ TEST(Organs, ThePegTriangleIsARing) {
   EXPECT_NEAR(report.signed_volume, 1.24e-6, 0.02e-6);
 }
 
+TEST(Organs, TheCupIsOpenAtItsTopAlone) {
+  const TriangleMesh cup = cupMesh();
+  const MeshReport report = inspectMesh(cup);
+  EXPECT_TRUE(report.closed());
+  EXPECT_EQ(report.components, 1u);
+  EXPECT_EQ(report.self_intersections, 0u);
+  EXPECT_NEAR(report.signed_volume, M_PI * (1e-4 * 0.046 - 0.64e-4 * 0.043), 0.01 * M_PI * 1e-4 * 0.046);
+  const SolidQuery query(cup);
+  for (const double z : {0.004, 0.02, 0.045}) {
+    EXPECT_FALSE(query.contains(Vec3(0.0005, 0.0001, z)));
+    EXPECT_TRUE(query.contains(Vec3(0.009, 0.0001, z)));
+  }
+  EXPECT_TRUE(query.contains(Vec3(0.0005, 0.0001, 0.0015)));
+}
+
 TEST(Organs, TheBladderIsHollow) {
   const MeshReport report = inspectMesh(bladderMesh());
   EXPECT_TRUE(report.closed());
@@ -212,6 +227,7 @@ TEST(Organs, ShippedMeshesAreTheGenerators) {
   all.push_back({"skin", skinSlabMesh()});
   all.push_back({"block", block32Mesh()});
   all.push_back({"peg_triangle", pegTriangleMesh()});
+  all.push_back({"cup", cupMesh()});
   for (const auto& [name, expected] : all) {
     std::ifstream in(std::string(SOURCE_DIR) + "/config/meshes/" + name + ".obj");
     ASSERT_TRUE(in.good()) << name;

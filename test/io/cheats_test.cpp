@@ -532,6 +532,96 @@ Cheats cheatsOf(const std::string& name) {
                }
                task.seconds(2.0);
              }}};
+  if (name == "camera") {
+    using test::ScopeHand;
+    // Each ball is looked for in some other way than it is asked for.
+    const auto tour = [](ShippedTask& task, const std::function<void(ScopeHand&, const std::string& ball)>& look) {
+      ScopeHand hand(task);
+      task.seconds(0.2);
+      for (const Stage& stage : task.training->task().stages) {
+        look(hand, stage.name);
+        task.seconds(1.3);
+      }
+    };
+    const auto ballAt = [](ShippedTask& task, const std::string& ball) -> Vec3 {
+      const Box box = boundsOf(task, ball);
+      return 0.5 * (box.min + box.max);
+    };
+    return {{"along the shaft, as with a straight endoscope",
+             [tour, ballAt](ShippedTask& task) {
+               tour(task, [&](ScopeHand& hand, const std::string& ball) {
+                 const Vec3 at = ballAt(task, ball);
+                 hand.visit(hand.towards(at + 0.05 * (hand.trocar() - at).normalized(), Vec3::UnitZ()));
+               });
+             }},
+            {"without turning it about its shaft",
+             [tour](ShippedTask& task) {
+               tour(task, [&](ScopeHand& hand, const std::string& ball) {
+                 hand.visit(hand.towards(hand.viewOf(ball).translation, Vec3::UnitZ()));
+               });
+             }},
+            {"in another order",
+             [](ShippedTask& task) {
+               ScopeHand hand(task);
+               task.seconds(0.2);
+               for (const char* ball : {"blue", "green", "yellow", "red", "white"}) {
+                 hand.visit(hand.viewOf(ball));
+                 task.seconds(1.3);
+               }
+             }},
+            {"a glance at each",
+             [](ShippedTask& task) {
+               ScopeHand hand(task);
+               task.seconds(0.2);
+               for (int round = 0; round < 3; ++round)
+                 for (const Stage& stage : task.training->task().stages) {
+                   hand.visit(hand.viewOf(stage.name), 3.0);
+                   task.seconds(0.3);
+                 }
+             }},
+            {"from afar",
+             [tour](ShippedTask& task) {
+               tour(task, [](ScopeHand& hand, const std::string& ball) {
+                 Pose view = hand.viewOf(ball);
+                 view.translation = hand.trocar() + 0.06 * (view.translation - hand.trocar()).normalized();
+                 hand.visit(view);
+               });
+             }},
+            {"the balls brought before it",
+             [tour, ballAt](ShippedTask& task) {
+               ScopeHand hand(task);
+               task.seconds(0.2);
+               for (const Stage& stage : task.training->task().stages) {
+                 const Instrument scope = task.world->snapshot({}).instruments.at(0);
+                 PlaceBodyCommand put;
+                 put.body = stage.name;
+                 put.pose.translation = scope.pose * Vec3(0.05 * std::cos(scope.def.view_angle), 0.0,
+                                                          -0.05 * std::sin(scope.def.view_angle));
+                 task.tries(put);
+                 task.seconds(1.3);
+               }
+             }},
+            {"with an endoscope of one's own",
+             [](ShippedTask& task) {
+               task.seconds(0.2);
+               AttachInstrumentCommand attach;
+               attach.def = task.world->snapshot({}).instruments.at(0).def;
+               attach.def.name = "own";
+               attach.def.pose.translation += Vec3(0.05, 0, 0.05);
+               task.tries(attach);
+               playCamera(task);
+             }},
+            {"with the cups thrown away", [](ShippedTask& task) {
+               task.seconds(0.2);
+               for (const auto& obstacle : task.world->snapshot({}).obstacles)
+                 task.tries(RemoveCommand{obstacle->name});
+               ScopeHand hand(task);
+               for (const Stage& stage : task.training->task().stages) {
+                 hand.visit(hand.towards(hand.viewOf(stage.name).translation, Vec3::UnitZ()));
+                 task.seconds(1.3);
+               }
+             }}};
+  }
   if (name == "peg_transfer") {
     // All six over and back, each in some other way than it is asked for.
     using test::PegHands;

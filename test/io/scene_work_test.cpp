@@ -104,7 +104,8 @@ TEST(SceneWork, EachShippedSceneDoesWhatItUsesAndNothingElse) {
                                                  {"lump.yaml", held},           {"pile.yaml", piled},
                                                  {"resection.yaml", on_ground}, {"skin.yaml", sheet},
                                                  {"vessel.yaml", held},         {"blocks.yaml", on_ground},
-                                                 {"gauze.yaml", layers},        {"peg_transfer.yaml", on_pegs}};
+                                                 {"gauze.yaml", layers},        {"peg_transfer.yaml", on_pegs},
+                                                 {"camera.yaml", held}};
   EXPECT_EQ(shippedScenes().size(), expected.size()) << "a scene has no line here";
   for (const std::string& scene : shippedScenes()) {
     SCOPED_TRACE(scene);

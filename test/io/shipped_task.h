@@ -501,6 +501,84 @@ inline void playPegTransfer(ShippedTask& task) {
   task.expect(task.training->passed(), "passed");
 }
 
+/// The endoscope of the task camera: goes from view to view, drawn back in between.
+class ScopeHand {
+ public:
+  explicit ScopeHand(ShippedTask& task) : task_(task) {
+    const Instrument scope = task.world->snapshot({}).instruments.at(0);
+    now_ = scope.pose;
+    trocar_ = *scope.def.remote_centre;
+    lean_ = scope.def.view_angle;
+  }
+  /// From where the line of sight is along the axis of the ball's cup.
+  Pose viewOf(const std::string& ball) const {
+    for (const auto& obstacle : task_.world->snapshot({}).obstacles) {
+      if (obstacle->name != "cup_" + ball) continue;
+      const Vec3 foot = obstacle->mesh.vertices[0], axis = (obstacle->mesh.vertices[1] - foot).normalized();
+      double near = 0.03, far = 0.12;
+      for (int k = 0; k < 50; ++k) {
+        const double middle = 0.5 * (near + far);
+        const Vec3 shaft = (foot + middle * axis - trocar_).normalized();
+        (std::acos(-shaft.dot(axis)) < lean_ ? near : far) = middle;
+      }
+      const Vec3 eye = foot + near * axis;
+      return towards(eye, -(-axis - std::cos(lean_) * (eye - trocar_).normalized()));
+    }
+    ADD_FAILURE() << "no cup of " << ball;
+    return now_;
+  }
+  /// The tip there, its shaft through the trocar, z as near to `up` as it can be.
+  Pose towards(const Vec3& tip, const Vec3& up) const {
+    Mat3 axes;
+    axes.col(0) = (tip - trocar_).normalized();
+    axes.col(1) = up.cross(axes.col(0)).normalized();
+    axes.col(2) = axes.col(0).cross(axes.col(1));
+    return {Quat(axes), tip};
+  }
+  Vec3 trocar() const { return trocar_; }
+  void go(const Pose& to, double time) {
+    const Pose from = now_;
+    const int steps = static_cast<int>(std::lround(time * 120.0));
+    for (int k = 1; k <= steps; ++k) {
+      const double u = static_cast<double>(k) / steps, s = u * u * u * (10.0 - 15.0 * u + 6.0 * u * u);
+      now_ = {from.rotation.slerp(s, to.rotation), from.translation + s * (to.translation - from.translation)};
+      LeadInstrumentCommand lead;
+      lead.name = "scope";
+      lead.pose = now_;
+      task_.apply<Done>(lead);
+      task_.seconds(1.0 / 120.0);
+    }
+  }
+  /// Drawn back, above the cups, and in again.
+  void visit(const Pose& view, double haste = 1.0) {
+    const auto back = [&](const Pose& pose) {
+      return Pose{pose.rotation, trocar_ + 0.09 * (pose.translation - trocar_).normalized()};
+    };
+    go(back(now_), 0.5 / haste);
+    go(back(view), 1.5 / haste);
+    go(view, 1.0 / haste);
+  }
+
+ private:
+  ShippedTask& task_;
+  Pose now_;
+  Vec3 trocar_;
+  double lean_ = 0.0;  // [rad]
+};
+
+inline void playCamera(ShippedTask& task) {
+  ScopeHand hand(task);
+  task.seconds(0.2);
+  for (const Stage& stage : task.training->task().stages) {
+    hand.visit(hand.viewOf(stage.name));
+    task.seconds(1.3);
+    task.expect(task.training->progress().times().size() > 0 &&
+                    task.training->task().stages[task.training->progress().stage() - 1].name == stage.name,
+                "sees " + stage.name);
+  }
+  task.expect(task.training->passed(), "passed");
+}
+
 inline const std::vector<std::pair<std::string, std::function<void(ShippedTask&)>>>& goodPlays() {
   static const std::vector<std::pair<std::string, std::function<void(ShippedTask&)>>> plays{
       {"palpate", playPalpate},
@@ -513,7 +591,8 @@ inline const std::vector<std::pair<std::string, std::function<void(ShippedTask&)
       {"ligate", playLigate},
       {"cholecystectomy", playCholecystectomy},
       {"peg_transfer", playPegTransfer},
-      {"transect", [](ShippedTask& task) { playTransect(task); }}};
+      {"transect", [](ShippedTask& task) { playTransect(task); }},
+      {"camera", playCamera}};
   return plays;
 }
 

@@ -14,6 +14,7 @@ namespace task_file_test {
 const std::string kScene = R"(
 bodies:
   - {name: pad, primitive: {box: [0.1, 0.1, 0.04]}, pose: {position: [0, 0, 0.2]}}
+instruments: {scope: {type: endoscope}}
 )";
 const std::string kTask = R"(scene: scene
 brief: what to do
@@ -32,6 +33,7 @@ stages:
   - hold: {body: pad, picks: 2}
   - hand_over: {body: pad}
   - put_back: {body: pad, distance: 0.01}
+  - see: {body: pad, off_centre: 0.2, fills_least: 0.1, fills_most: 0.9}
 limits: {time: 60, force: 2, strain: 0.4, forbidden: [{name: bed, box: {min: [3, 3, 0], max: [4, 4, 1]}}, {body: pad}], end: [time, force]}
 metrics:
   plan_rms: {weight: 2, good: 0.001, bad: 0.004, pass: 0.003}
@@ -65,7 +67,7 @@ TEST_F(TaskFile, IsReadWhole) {
   const TaskDef& task = loaded->task;
   EXPECT_EQ("task", task.name);
   EXPECT_EQ("scene", loaded->scene.name);
-  ASSERT_EQ(11u, task.stages.size());
+  ASSERT_EQ(12u, task.stages.size());
   EXPECT_EQ("press", task.stages[0].name);
   EXPECT_EQ(2.0, task.stages[0].hold_for);
   EXPECT_EQ(0.5, std::get<PressTo>(task.stages[0].condition).force);
@@ -81,6 +83,11 @@ TEST_F(TaskFile, IsReadWhole) {
   EXPECT_EQ(2, std::get<Hold>(task.stages[8].condition).picks);
   EXPECT_EQ("pad", std::get<HandOver>(task.stages[9].condition).body);
   EXPECT_EQ(0.01, std::get<PutBack>(task.stages[10].condition).distance);
+  const See& see = std::get<See>(task.stages[11].condition);
+  EXPECT_EQ("pad", see.body);
+  EXPECT_EQ(0.2, see.off_centre);
+  EXPECT_EQ(0.1, see.fills_least);
+  EXPECT_EQ(0.9, see.fills_most);
   EXPECT_EQ(60.0, task.limits.time);
   EXPECT_EQ(2.0, task.limits.measured.force);
   EXPECT_EQ((std::set<LimitKind>{LimitKind::kTime, LimitKind::kForce}), task.limits.ends);
@@ -128,17 +135,21 @@ TEST_F(TaskFile, ErrorsNameLineKeyAndWhatIsAccepted) {
       {"hand_over: {body: pad}", "hand_over: {body: pod}", ":16:", "no body 'pod'", "pad"},
       {"hand_over: {body: pad}", "hand_over: {bode: pad}", ":16:", "hand_over has no body", "name"},
       {"put_back: {body: pad", "put_back: {body: pud", ":17:", "no body 'pud'", "pad"},
-      {"body: pad, distance: 0.01}\nlimits", "body: pad}\nlimits", ":17:", "no distance", "above 0"},
+      {"put_back: {body: pad, distance: 0.01}", "put_back: {body: pad}", ":17:", "no distance", "above 0"},
+      {"see: {body: pad", "see: {body: pod", ":18:", "no body 'pod'", "pad"},
+      {"see: {body: pad, ", "see: {", ":18:", "see has no body", "name"},
+      {"off_centre: 0.2", "off_centre: 1.1", ":18:", "off_centre is 1.1", "above 0 to 1"},
+      {"fills_least: 0.1", "fills_least: 0.9", ":18:", "fills_least is 0.9", "below fills_most, 0.9"},
       {"- {name: press", "- put_back: {body: pad, distance: 1}\n  - {name: press", ":7:", "met from the start",
        "a stage before it"},
       {"end: [time, force]", "end: [time, forbidden]", ":8:", "the body of the plan is forbidden", "another body"},
-      {"end: [time, force]", "end: [time, farce]", ":18:", "'farce'", "strain"},
-      {"strain: 0.4", "strain: -1", ":18:", "strain is -1", "above 0"},
-      {"{body: pad}]", "{body: pet}]", ":18:", "no body 'pet'", "pad"},
-      {"plan_rms:", "plan_rmse:", ":20:", "did you mean 'plan_rms'", "docs/metrics.md"},
-      {"sparc.pick:", "sparc:", ":21:", "unknown metric 'sparc'", "docs/metrics.md"},
-      {"good: -1.5", "good: -4", ":21:", "the same", "two"},
-      {"pass_mark: 55", "pass_mark: 155", ":22:", "pass_mark is 155", "0 to 100"},
+      {"end: [time, force]", "end: [time, farce]", ":19:", "'farce'", "strain"},
+      {"strain: 0.4", "strain: -1", ":19:", "strain is -1", "above 0"},
+      {"{body: pad}]", "{body: pet}]", ":19:", "no body 'pet'", "pad"},
+      {"plan_rms:", "plan_rmse:", ":21:", "did you mean 'plan_rms'", "docs/metrics.md"},
+      {"sparc.pick:", "sparc:", ":22:", "unknown metric 'sparc'", "docs/metrics.md"},
+      {"good: -1.5", "good: -4", ":22:", "the same", "two"},
+      {"pass_mark: 55", "pass_mark: 155", ":23:", "pass_mark is 155", "0 to 100"},
   };
   for (const Wrong& w : wrong) {
     const std::string error = errorOf(w.from, w.to);
@@ -147,6 +158,16 @@ TEST_F(TaskFile, ErrorsNameLineKeyAndWhatIsAccepted) {
     EXPECT_NE(std::string::npos, error.find("accepted: ")) << w.to << ": " << error;
     EXPECT_NE(std::string::npos, error.find(w.accepted)) << w.to << ": " << error;
   }
+}
+
+TEST_F(TaskFile, NothingIsSeenWithoutAnEndoscope) {
+  std::ofstream(folder_.path() + "/blind.yaml") << "bodies: [{name: pad, primitive: {sphere: 0.1}}]\n"
+                                                << "instruments: {rod: {type: probe}}\n";
+  std::ofstream(folder_.path() + "/task.yaml") << "scene: blind.yaml\nstages:\n  - see: {body: pad}\n";
+  const auto loaded = readTask(folder_.path() + "/task.yaml", folder_.path(), FileAccess());
+  ASSERT_FALSE(loaded.ok());
+  EXPECT_NE(std::string::npos, loaded.error().detail.find("task.yaml:3: ")) << loaded.error().detail;
+  EXPECT_NE(std::string::npos, loaded.error().detail.find("the scene has no endoscope")) << loaded.error().detail;
 }
 
 TEST_F(TaskFile, ALineOrACircleIsAPlanToo) {

@@ -274,7 +274,7 @@ class Fuzzer:
         if service == 'reset_bodies':
             return dict(bodies=self.list_of_names())
         if service == 'attach_instrument':
-            yaml = r.choice(['{type: grasper}', '{type: probe}', '{type: hook, max_force: %s}' % self.number(), '{type: scissors, grip: %s}' % self.number(), '{type: scalpel, sharpness: %s}' % self.number(), '{type: %s}' % self.string()[:40], '[1]'])
+            yaml = r.choice(['{type: grasper}', '{type: probe}', '{type: hook, max_force: %s}' % self.number(), '{type: scissors, grip: %s}' % self.number(), '{type: scalpel, sharpness: %s}' % self.number(), '{type: endoscope, view_angle: %s}' % self.number(), '{type: %s}' % self.string()[:40], '[1]'])
             return dict(name=r.choice(['left', 'right', 'push', self.string()[:60]]), yaml=yaml, pose=self.pose())
         if service == 'detach_instrument':
             return dict(name=r.choice(['left', 'right', self.string()[:60]]))

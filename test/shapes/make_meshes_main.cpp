@@ -77,8 +77,8 @@ bool writeObj(const std::string& path, const std::string& comment, const Triangl
 int main(int argc, char** argv) {
   CLI::App app(
       "Writes liver.obj, kidney.obj, fish.obj, bladder.obj, skin.obj, block.obj, gallbladder.obj, stomach.obj, "
-      "vessel.obj, omentum.obj "
-      "and peg_triangle.obj, and the parts of the instruments that are drawn.");
+      "vessel.obj, omentum.obj, peg_triangle.obj "
+      "and cup.obj, and the parts of the instruments that are drawn.");
   std::string folder, drawn;
   unsigned seed = 1;
   app.add_option("--out", folder, "folder to write into; it must exist")->required()->check(CLI::ExistingDirectory);
@@ -102,7 +102,8 @@ int main(int argc, char** argv) {
                        writeObj(folder + "/stomach.obj", fixed, meshless::stomachMesh()) &&
                        writeObj(folder + "/vessel.obj", fixed, meshless::vesselMesh()) &&
                        writeObj(folder + "/omentum.obj", fixed, meshless::omentumMesh()) &&
-                       writeObj(folder + "/peg_triangle.obj", fixed, meshless::pegTriangleMesh());
+                       writeObj(folder + "/peg_triangle.obj", fixed, meshless::pegTriangleMesh()) &&
+                       writeObj(folder + "/cup.obj", fixed, meshless::cupMesh());
   if (!written) return 1;
   if (drawn.empty()) return 0;
   const bool drawn_too = writeObj(drawn + "/shaft.obj", fixed, meshless::shaftMesh(), true) &&

@@ -146,6 +146,29 @@ TriangleMesh pegTriangleMesh() {
   return mesh;
 }
 
+TriangleMesh cupMesh() {
+  constexpr double kOuter = 0.010, kInner = 0.008, kFloor = 0.003, kHeight = 0.046, kPi = 3.14159265358979323846;
+  constexpr Index kSides = 32;
+  // Its outline from the axis below to the axis within: radius, z.
+  const std::array<double, 2> outline[] = {{kOuter, 0.0}, {kOuter, kHeight}, {kInner, kHeight}, {kInner, kFloor}};
+  TriangleMesh mesh;
+  mesh.vertices = {{0.0, 0.0, 0.0}, {0.0, 0.0, kFloor}};
+  for (const auto& [radius, z] : outline)
+    for (Index s = 0; s < kSides; ++s)
+      mesh.vertices.push_back(
+          {radius * std::cos(2.0 * kPi * s / kSides), radius * std::sin(2.0 * kPi * s / kSides), z});
+  const auto at = [](Index ring, Index side) { return 2 + ring * kSides + side % kSides; };
+  for (Index s = 0; s < kSides; ++s) {
+    mesh.triangles.push_back({0, at(0, s + 1), at(0, s)});
+    mesh.triangles.push_back({1, at(3, s), at(3, s + 1)});
+    for (Index ring = 0; ring < 3; ++ring) {
+      mesh.triangles.push_back({at(ring, s), at(ring, s + 1), at(ring + 1, s + 1)});
+      mesh.triangles.push_back({at(ring, s), at(ring + 1, s + 1), at(ring + 1, s)});
+    }
+  }
+  return mesh;
+}
+
 TriangleMesh block32Mesh() { return boxMesh(Vec3(0.1, 0.1, 0.05), 2, 2, 1); }
 
 }  // namespace meshless

@@ -15,5 +15,8 @@ TriangleMesh skinSlabMesh();                 // 0.2 x 0.2 x 0.01 m
 TriangleMesh block32Mesh();                  // 0.1 x 0.1 x 0.05 m; 32 triangles, and 32 tetrahedra about its centre
 /// What is put on pegs: a ring of three straight walls about z, 9 mm high and 2.5 mm thick, with round corners.
 TriangleMesh pegTriangleMesh();
+/// What hides a target but from those that look into it: along z, open at +z, 20 mm wide and 46 mm high, the floor at
+/// 0, the wall 2 mm thick.
+TriangleMesh cupMesh();
 
 }  // namespace meshless

@@ -495,7 +495,7 @@ TEST(DamagedState, OfAnotherKindOrVersion) {
   expectRefused("solid ball\nfacet normal 0 0 1\n", "MLSSTATE");
   std::string bytes = bytesOf(ballThatFalls());
   bytes[8] = 9;
-  expectRefused(bytes, "version 9; accepted: 32");
+  expectRefused(bytes, "version 9; accepted: 33");
 }
 
 // The text at the start is of a length that is known to lie where it lies.

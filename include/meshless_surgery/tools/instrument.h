@@ -13,8 +13,8 @@ namespace meshless {
 
 /// A rod with a round tip; two jaws on a hinge; a rod whose tip is bent aside, to +y; two blades on a hinge that slide
 /// along each other, the upper one on the side of +z; two jaws that leave a clip on what they close on; a blade in the
-/// plane of x and y, whose edge is on the side of -y.
-enum class InstrumentType { kProbe, kGrasper, kHook, kScissors, kClipApplier, kScalpel };
+/// plane of x and y, whose edge is on the side of -y; a rod that looks out of its tip, aside by view_angle to -z.
+enum class InstrumentType { kProbe, kGrasper, kHook, kScissors, kClipApplier, kScalpel, kEndoscope };
 const char* toString(InstrumentType type);
 
 /// What a user chose. The hand is an impedance: a spring and a damper draw the instrument to where it is wanted, by no
@@ -22,33 +22,36 @@ const char* toString(InstrumentType type);
 struct InstrumentDef {
   std::string name;
   InstrumentType type = InstrumentType::kProbe;
-  Pose pose;                          // of the tip, where it begins
-  double shaft_radius = 0.0025;       // [m]
-  double shaft_length = 0.3;          // [m]
-  double jaw_length = 0.018;          // [m] from hinge to tip, or of a blade; of a hook: how far it reaches aside
-  double jaw_width = 0.004;           // [m]
-  double jaw_thickness = 0.0019;      // [m] of each
-  double friction = 0.5;              // Coulomb, combined with the tissue's as that of two bodies
-  double stiffness = 2000.0;          // [N/m]
-  double damping = 20.0;              // [N s/m]
-  double angular_stiffness = 5.0;     // [N m/rad]
-  double angular_damping = 0.05;      // [N m s/rad]
-  double max_force = 10.0;            // [N]
-  double max_torque = 0.5;            // [N m]
-  double max_speed = 1.0;             // [m/s] of the hand: a pose farther away is gone to at this
-  double grip = 5.0;                  // [N] of each jaw, in its middle
-  double sharpness = 1.0;             // of a scalpel: the tissue's toughness over what it takes [J/m^2] (a sharp one: 1)
+  Pose pose;                       // of the tip, where it begins
+  double shaft_radius = 0.0025;    // [m]
+  double shaft_length = 0.3;       // [m]
+  double jaw_length = 0.018;       // [m] from hinge to tip, or of a blade; of a hook: how far it reaches aside
+  double jaw_width = 0.004;        // [m]
+  double jaw_thickness = 0.0019;   // [m] of each
+  double friction = 0.5;           // Coulomb, combined with the tissue's as that of two bodies
+  double stiffness = 2000.0;       // [N/m]
+  double damping = 20.0;           // [N s/m]
+  double angular_stiffness = 5.0;  // [N m/rad]
+  double angular_damping = 0.05;   // [N m s/rad]
+  double max_force = 10.0;         // [N]
+  double max_torque = 0.5;         // [N m]
+  double max_speed = 1.0;          // [m/s] of the hand: a pose farther away is gone to at this
+  double grip = 5.0;               // [N] of each jaw, in its middle
+  double sharpness = 1.0;          // of a scalpel: the tissue's toughness over what it takes [J/m^2] (a sharp one: 1)
+  double view_angle = 0.0;         // [rad] of an endoscope: between its shaft and its line of sight
+  double field_of_view = 1.2;      // [rad] of an endoscope: across its round picture
   bool latch = false;  // of a grasper: what its jaws have grasped stays in them, by a spring, until they open
   std::optional<Vec3> remote_centre;  // [m] of a trocar, through which the shaft goes
   Color color{0.75f, 0.78f, 0.82f, 1.0f};
 
   bool hasJaws() const {
-    return type == InstrumentType::kGrasper || type == InstrumentType::kScissors || type == InstrumentType::kClipApplier;
+    return type == InstrumentType::kGrasper || type == InstrumentType::kScissors ||
+           type == InstrumentType::kClipApplier;
   }
   /// [m] of a scalpel: where its edge ends, which begins at the tip.
   Vec3 heel() const { return {-jaw_length, -0.5 * jaw_width, 0.0}; }
   Vec3 ahead() const { return Vec3(-heel().y(), heel().x(), 0.0).normalized(); }  // unit: where the edge faces
-  double jawEdge() const;       // [m] of the triangles of a jaw
+  double jawEdge() const;                                                         // [m] of the triangles of a jaw
   double bladeOverlap() const;  // [m] by which the edges of closed blades are past the middle
   double bladeReach() const;    // [m] the same of where they cut
   /// Names the value and what is accepted.
@@ -62,7 +65,7 @@ struct InstrumentNumber {
   double least, most;
   const char* unit;
 };
-extern const std::array<InstrumentNumber, 15> kInstrumentNumbers;
+extern const std::array<InstrumentNumber, 17> kInstrumentNumbers;
 
 /// It names topics and a tf frame.
 bool isInstrumentName(const std::string& name);
@@ -86,6 +89,10 @@ struct InstrumentShape {
   void place(const Pose& pose, double jaw, Points& vertices) const;
 };
 InstrumentShape shapeOf(const InstrumentDef& def);
+
+/// Of an endoscope there: x along its line of sight, z up in its picture. The camera head is held upright: z of the
+/// world is up in the picture; where the line of sight is along it, y of the instrument is to the left.
+Pose sightOf(const InstrumentDef& def, const Pose& pose);
 
 /// What contact does to an instrument in a substep. Torques are about the tip.
 struct InstrumentLoad {
@@ -127,30 +134,30 @@ struct Instrument {
   Vec3 velocity = Vec3::Zero(), spin = Vec3::Zero();  // [m/s, rad/s] in the last substep
   double jaw_rate = 0.0;                              // [rad/s]
   double jaw_stop = 0.0;                              // [rad] they close no further
-  double cut_to = 0.0;             // [m] from the hinge to which blades have cut what is between them
-  std::vector<BladeWound> wounds;  // that they may go on with, one a body
-  std::uint32_t stroke = 0;        // how often they have opened, or an edge has left tissue
-  bool in_tissue = false;          // the edge of a scalpel
-  Pose edge_at;                    // where it has cut to
-  Vec3 cut_force = Vec3::Zero();   // [N] of what it cuts on it, in the last substep
-  double resists = 0.0;            // [N] of what they cut next: toughness times thickness
-  double cut_torque = 0.0;         // [N m] of that on the jaws in the last substep
-  double cut_work = 0.0;           // [J] of that since the last snip
-  double owed = 0.0;               // [J] that snips have taken more than that came to
-  double answers = 0.0;            // [N/m] of force from outside, for the way that this moved it in the last substep
-  InstrumentLoad load;             // of the last substep
-  Vec3 force = Vec3::Zero();       // [N] on it, mean over the last step
-  Vec3 torque = Vec3::Zero();      // [N m] likewise
-  double jaw_torque = 0.0;         // [N m] likewise, that opens
-  std::string holds;               // the body between its jaws; empty: none
-  double gripped = 0.0;            // [N] with which the jaws press it, the weaker of them, mean over the last step
-  double closed_to = 0.0;          // [rad] the least that was wanted between the jaws meanwhile; of a clip applier,
-                                   // between them when they put on a clip
-  bool loaded = false;             // a clip applier has a clip in its jaws, from when they have opened
-  double lost_for = 0.0;           // [s] that they have not
-  PickId latched = 0;              // the spring that holds it; 0: none
-  Vec3 latch_at = Vec3::Zero();    // [m] where that ends, in the frame of the instrument
-  Vec3 latch_force = Vec3::Zero(); // [N] of it on the instrument, in the last step
+  double cut_to = 0.0;              // [m] from the hinge to which blades have cut what is between them
+  std::vector<BladeWound> wounds;   // that they may go on with, one a body
+  std::uint32_t stroke = 0;         // how often they have opened, or an edge has left tissue
+  bool in_tissue = false;           // the edge of a scalpel
+  Pose edge_at;                     // where it has cut to
+  Vec3 cut_force = Vec3::Zero();    // [N] of what it cuts on it, in the last substep
+  double resists = 0.0;             // [N] of what they cut next: toughness times thickness
+  double cut_torque = 0.0;          // [N m] of that on the jaws in the last substep
+  double cut_work = 0.0;            // [J] of that since the last snip
+  double owed = 0.0;                // [J] that snips have taken more than that came to
+  double answers = 0.0;             // [N/m] of force from outside, for the way that this moved it in the last substep
+  InstrumentLoad load;              // of the last substep
+  Vec3 force = Vec3::Zero();        // [N] on it, mean over the last step
+  Vec3 torque = Vec3::Zero();       // [N m] likewise
+  double jaw_torque = 0.0;          // [N m] likewise, that opens
+  std::string holds;                // the body between its jaws; empty: none
+  double gripped = 0.0;             // [N] with which the jaws press it, the weaker of them, mean over the last step
+  double closed_to = 0.0;           // [rad] the least that was wanted between the jaws meanwhile; of a clip applier,
+                                    // between them when they put on a clip
+  bool loaded = false;              // a clip applier has a clip in its jaws, from when they have opened
+  double lost_for = 0.0;            // [s] that they have not
+  PickId latched = 0;               // the spring that holds it; 0: none
+  Vec3 latch_at = Vec3::Zero();     // [m] where that ends, in the frame of the instrument
+  Vec3 latch_force = Vec3::Zero();  // [N] of it on the instrument, in the last step
 
   /// Where the hand goes within h [s]: no faster than it may.
   Pose handAfter(double h) const;

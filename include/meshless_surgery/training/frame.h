@@ -16,6 +16,13 @@ constexpr std::size_t kHands = 6;
 const char* toString(Hand hand);
 
 struct TrainingFrame {
+  /// Where a body is in the picture of an endoscope. The body is taken for a sphere about the middle of its bounds.
+  struct Shown {
+    std::string body;
+    double off_centre = 0.0;  // [1] of its middle: 0 in the middle of the picture, 1 at its rim
+    double fills = 0.0;       // [1] how wide it is, over the width of the picture
+    bool hidden = false;      // another body or an obstacle is in front of its middle
+  };
   struct Tool {
     ToolKind kind = ToolKind::kPick;
     std::uint32_t pick = 0;        // its number, as that of an instrument
@@ -30,6 +37,7 @@ struct TrainingFrame {
     double force = 0.0;   // [N] between tool and tissue, mean over the step
     Vec3 touch =
         Vec3::Zero();  // [m] of the push sphere: the foremost place of it in the tissue; of instruments the tip
+    std::vector<Shown> shown{};  // by an endoscope, of the bodies that are to be seen
   };
   struct Body {
     std::string name;
@@ -61,14 +69,16 @@ struct TrainingFrame {
   bool sampled = false;       // centres and strains are there, where they are wanted
   bool centres = false;       // they are there
   bool places = false;        // what bodies are around is there
+  bool pictures = false;      // what endoscopes show is there
 };
 
 /// What costs something, and is looked at ten times a second where a task needs it.
 struct FrameWants {
   bool centres = false, strains = false;
   std::vector<std::string> placed;  // bodies that are to be put on obstacles; what supports them is there in each step
+  std::vector<std::string> seen;    // bodies that an endoscope is to show
 
-  bool any() const { return centres || strains || !placed.empty(); }
+  bool any() const { return centres || strains || !placed.empty() || !seen.empty(); }
 };
 
 /// After a step. `events`: what World::takeEvents has given since the frame before.

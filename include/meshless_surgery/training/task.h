@@ -70,8 +70,16 @@ struct PutOn {
   bool handed_over = false;  // and each came there by a hand that took it over from another one in the air
 };
 
+/// An endoscope shows the body: its middle is so near to that of the picture, nothing is in front of it, and it is
+/// neither too far nor too near. A body that was cut is not seen.
+struct See {
+  std::string body;
+  double off_centre = 0.3;  // above 0 to 1, of the way from the middle of the picture to its rim; at most
+  double fills_least = 0.05, fills_most = 1.0;  // of the width of the picture
+};
+
 using Condition = std::variant<Reach, StretchTo, PressTo, CutAlong, Separate, RemoveToTray, LeaveNothing, LetGo,
-                               Clipped, Hold, HandOver, PutBack, PutOn>;
+                               Clipped, Hold, HandOver, PutBack, PutOn, See>;
 
 struct Stage {
   std::string name, brief;
@@ -151,6 +159,8 @@ struct TaskDef {
   std::vector<std::string> vessels() const;
   /// That stages want put on obstacles.
   std::vector<std::string> placed() const;
+  /// That an endoscope is to show.
+  std::vector<std::string> seen() const;
   /// That the world has to have.
   std::vector<std::string> bodies() const;
 };
@@ -187,6 +197,7 @@ class TaskProgress {
  private:
   void watch(const Condition& condition, const TrainingFrame& frame);
   void watch(const PutOn& put, const TrainingFrame& frame);
+  void watch(const See& see, const TrainingFrame& frame);
   bool meets(const PutOn& put) const;
   bool meets(const Condition& condition, const TrainingFrame& frame, const RestTissue& tissue) const;
   std::string broken(const Metrics& metrics) const;
@@ -211,6 +222,7 @@ class TaskProgress {
     std::string on;           // the obstacle that it is on, as of the last frame that says so
   };
   std::map<const PutOn*, std::map<std::string, Carried>> carried_;
+  std::set<const See*> in_picture_;                 // those that are met, as of the last frame that says so
   std::map<std::string, Whereabouts> whereabouts_;  // of bodies that are to be put back, once they were looked at
   double held_for_ = 0.0;
   std::vector<double> times_;
