@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include <rviz/properties/float_property.h>
 #include <sensor_msgs/JointState.h>
 #include <pluginlib/class_list_macros.hpp>
 
@@ -10,9 +11,9 @@
 namespace meshless {
 namespace {
 
-constexpr double kOpen = 0.6;                      // [rad] between jaws
-constexpr double kHalfClosed = 0.5 * kOpen;        // [rad] likewise
+constexpr float kOpen = 0.3f, kWidest = 1.6f;      // [rad] between jaws
 constexpr double kTurnStep = 10.0 / 180.0 * M_PI;  // [rad] a notch
+constexpr double kFineStep = 0.001;                // [m] a notch, with Shift
 constexpr double kTilt = 0.005;                    // [rad] a pixel
 
 bool hasJaws(const std::string& type) { return type == "grasper" || type == "scissors" || type == "clip_applier"; }
@@ -20,6 +21,14 @@ bool hasJaws(const std::string& type) { return type == "grasper" || type == "sci
 }  // namespace
 
 LeadTool::LeadTool() : HandTool('j') {}
+
+void LeadTool::onInitialize() {
+  HandTool::onInitialize();
+  opening_ =
+      new rviz::FloatProperty("Opening", kOpen, "[rad] between the jaws where they are open.", getPropertyContainer());
+  opening_->setMin(0.0f);
+  opening_->setMax(kWidest);
+}
 
 void LeadTool::nodeChanged() {
   instruments_.clear();
@@ -81,7 +90,7 @@ bool LeadTool::takeUp() {
   Ogre::Quaternion turn;
   worldPose(origin, turn);
   hand_ = {toFixed(instrument->pose.position), turn * toOgre(instrument->pose.orientation)};
-  closed_ = instrument->jaw < kHalfClosed;
+  closed_ = instrument->jaw < 0.5 * opening_->getFloat();
   moves_jaws_ = false;
   leads_ = true;
   return true;
@@ -89,7 +98,7 @@ bool LeadTool::takeUp() {
 
 void LeadTool::lead() {
   sensor_msgs::JointState jaws;
-  if (moves_jaws_) jaws.position = {closed_ ? 0.0 : kOpen};
+  if (moves_jaws_) jaws.position = {closed_ ? 0.0 : opening_->getFloat()};
   // Nothing is repeated while it stands: what comes just after a reset would lead it away.
   stream().say([poses = poses_, pose = poseMessage(hand_.at, hand_.turn), to_jaws = jaws_, jaws] {
     poses.publish(pose);
@@ -110,7 +119,7 @@ bool LeadTool::onMouse(rviz::ViewportMouseEvent& event) {
     if (event.control())
       hand_.turn = hand_.turn * Ogre::Quaternion(Ogre::Radian(notches * kTurnStep), Ogre::Vector3::UNIT_X);
     else
-      hand_.at += viewDirection() * (notches * kWheelStep);
+      hand_.at += viewDirection() * (notches * (event.shift() ? kFineStep : kWheelStep));
     lead();
   }
   switch (drag_) {
@@ -178,7 +187,8 @@ QString LeadTool::help() const {
       which += "<b>" + QString::number(k + 1) + ":</b> " + QString::fromStdString(instruments_[k].name) + ".  ";
   const QString name =
       "<b>" + QString::fromStdString(name_) + "</b> (" + QString::fromStdString(instrument->type) + "):  ";
-  const QString wheel = "<b>Wheel:</b> away, towards.  <b>Ctrl+wheel:</b> turn about its shaft.  ";
+  const QString wheel =
+      "<b>Wheel:</b> away, towards; finer with <b>Shift</b>.  <b>Ctrl+wheel:</b> turn about its shaft.  ";
   const QString jaws = closed_ ? "open" : "close";
   if (dragging())
     return name + "<b>Move:</b> it follows; with <b>Ctrl</b> it tilts.  " + wheel +

@@ -9,6 +9,10 @@
 #include <meshless_surgery/InstrumentState.h>
 #endif
 
+namespace rviz {
+class FloatProperty;
+}
+
 namespace meshless {
 
 class LeadTool : public HandTool {
@@ -16,6 +20,8 @@ class LeadTool : public HandTool {
 
  public:
   LeadTool();
+
+  void onInitialize() override;
 
  protected:
   bool onMouse(rviz::ViewportMouseEvent& event) override;
@@ -48,6 +54,7 @@ class LeadTool : public HandTool {
   void lead();
   void moveJaws();
 
+  rviz::FloatProperty* opening_ = nullptr;
   std::vector<meshless_surgery::InstrumentState> instruments_;
   std::string name_;
   bool leads_ = false;
