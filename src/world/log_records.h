@@ -7,7 +7,7 @@
 
 namespace meshless {
 
-constexpr std::uint32_t kLogVersion = 15;  // of the hashes in it, too
+constexpr std::uint32_t kLogVersion = 16;  // of the hashes in it, too
 
 enum class RecordKind : std::uint8_t {
   kStart,
