@@ -119,7 +119,7 @@ class PointSearch {
       if (scratch_.first[v] == kNoIndex && !inside && !mayBeginInside(a_.frame->vertices[v])) continue;
       if (search_.self == PairSearch::Self::kCuts && !a_.surface->cut_vertices[v]) continue;
       const SurfacePoint point = vertexOf(a_, v);
-      behind_point_ = SearchScratch::Behind::kUnknown;
+      behind_point_ = Layers::kUnknown;
       candidates_.clear();
       if (inside)
         gather(point, margin_ + remembered_->depth);
@@ -167,11 +167,12 @@ class PointSearch {
     ++queried_;
     if (candidates_.empty() && mayBeginInside(p) && windingAround(p) > 0) gather(point, b_.frame->bounds.diagonal());
     if (candidates_.empty()) return;
-    const NearFace& best = chooseNearest(point);
-    const double distance = signedDistance(best, p);
+    const NearFace* const best = chooseNearest(point);
+    if (!best) return;
+    const double distance = signedDistance(point, *best);
     made_ = 0;
     if (distance >= -tie_)
-      meetOutside(point, best);
+      meetOutside(point, *best);
     else if (search_.self == PairSearch::Self::kNo || remembered_)
       meetInside(point, -distance);
   }
@@ -189,26 +190,35 @@ class PointSearch {
   }
 
   // A surface meets itself where, beyond what overlaps, one layer of tissue is behind the point and one behind the
-  // face. Elsewhere it is turned inside out, or has gone through itself, and a row would keep it so.
-  bool hasTissueBehind(const SurfacePoint& point, const NearFace& c) {
+  // face. Elsewhere it is turned inside out, or has gone through itself, and a row would keep it so. In a crumple each
+  // point has hundreds of candidates, and this costs a hundred times what the rest of one does: ask it last.
+  bool hasTissueBehind(const SurfacePoint& point, NearFace& c) {
     if (search_.self == PairSearch::Self::kNo || !b_.surface->closed) return true;
+    if (c.behind == Layers::kUnknown) c.behind = findBehind(point, c) ? Layers::kOne : Layers::kNone;
+    return c.behind == Layers::kOne;
+  }
+
+  bool findBehind(const SurfacePoint& point, const NearFace& c) {
     const Vec3& normal = b_.frame->face_normals[c.face];
     const Triangle& t = b_.surface->triangles[c.face];
     const Points& x = b_.frame->vertices;
     const Vec3 middle = (x[t[0]] + x[t[1]] + x[t[2]]) / 3.0;  // ends of a face may lie on a rim
     const double deep = normal.dot(c.point - point.place);
-    if (deep > 0.0)
-      return windingAround(middle - (deep + margin_) * normal) == 1 &&
-             windingAround(point.place + deep * normal - margin_ * point.normal) == 1;
-    // Where nothing overlaps, the point is asked once for all faces, and the face once for all points.
-    return isTissue(behind_point_, point.place - margin_ * point.normal) &&
-           isTissue(scratch_.behind[c.face], middle - margin_ * normal);
+    // The point is asked once for all faces, and the face once for all points.
+    const Layers of_point = layersAt(behind_point_, point.place - margin_ * point.normal);
+    if (of_point == Layers::kNone) return false;
+    const Layers of_face = layersAt(scratch_.behind[c.face], middle - margin_ * normal);
+    if (!(deep > 0.0)) return of_point == Layers::kOne && of_face == Layers::kOne;
+    return of_face != Layers::kNone && windingAround(middle - (deep + margin_) * normal) == 1 &&
+           windingAround(point.place + deep * normal - margin_ * point.normal) == 1;
   }
 
-  bool isTissue(SearchScratch::Behind& known, const Vec3& at) const {
-    using Behind = SearchScratch::Behind;
-    if (known == Behind::kUnknown) known = windingAround(at) == 1 ? Behind::kTissue : Behind::kNone;
-    return known == Behind::kTissue;
+  Layers layersAt(Layers& known, const Vec3& at) const {
+    if (known == Layers::kUnknown) {
+      const int winding = windingAround(at);
+      known = winding < 1 ? Layers::kNone : winding == 1 ? Layers::kOne : Layers::kMore;
+    }
+    return known;
   }
 
   void gather(const SurfacePoint& point, double within) {
@@ -230,41 +240,46 @@ class PointSearch {
     c.distance = way.norm();
     const double towards = std::max({way.dot(u[t[0]]), way.dot(u[t[1]]), way.dot(u[t[2]])}) - way.dot(point.velocity);
     c.reach = c.distance > 0.0 ? search_.h * std::max(0.0, towards / c.distance) : 0.0;
-    if (c.distance > within + c.reach || !hasTissueBehind(point, c)) return;
+    if (c.distance > within + c.reach) return;
     c.reach += margin_;
     c.corners = static_cast<int>((c.weights.array() > 0.0).count());
     candidates_.push_back(c);
   }
 
-  const NearFace& chooseNearest(const SurfacePoint& point) const {
-    const auto first = std::min_element(candidates_.begin(), candidates_.end(),
-                                        [](const NearFace& x, const NearFace& y) { return x.distance < y.distance; });
-    if (first->distance > tie_) return *first;  // signs hold at the nearest point alone
-    const NearFace* best = nullptr;
+  /// Of those with tissue behind them; null: there are none.
+  NearFace* chooseNearest(const SurfacePoint& point) {
+    NearFace* nearest;
+    do {
+      nearest = nullptr;
+      for (NearFace& c : candidates_)
+        if (c.behind != Layers::kNone && (!nearest || c.distance < nearest->distance)) nearest = &c;
+    } while (nearest && !hasTissueBehind(point, *nearest));
+    if (!nearest || nearest->distance > tie_) return nearest;  // signs hold at the nearest point alone
+    NearFace* best = nearest;
     double most = -3.0;
-    for (const NearFace& c : candidates_) {
+    for (NearFace& c : candidates_) {
       if (c.distance > tie_) continue;
       const double opposed =
           opposition(*a_.frame, point, b_.frame->face_normals[c.face]) + (c.corners == 3 ? 1e-6 : 0.0);
-      if (!(opposed > most)) continue;
+      if (!(opposed > most) || !hasTissueBehind(point, c)) continue;
       most = opposed;
       best = &c;
     }
-    return best ? *best : candidates_.front();
+    return best;
   }
 
-  double signedDistance(const NearFace& best, const Vec3& p) const {
-    const Vec3 way = p - best.point;
+  double signedDistance(const SurfacePoint& point, const NearFace& best) {
+    const Vec3 way = point.place - best.point;
     if (best.distance <= tie_) return b_.frame->face_normals[best.face].dot(way);
     // A sheet has no inside: it is where it was.
     if (!b_.surface->closed) return remembered_ && remembered_->normal.dot(way) < 0.0 ? -best.distance : best.distance;
     Vec3 pseudonormal = Vec3::Zero();
-    for (const NearFace& c : candidates_) {
+    for (NearFace& c : candidates_) {
       if (!((c.point - best.point).squaredNorm() <= 1e-18 * search_.length * search_.length)) continue;
-      pseudonormal += angleAt(c) * b_.frame->face_normals[c.face];
+      if (hasTissueBehind(point, c)) pseudonormal += angleAt(c) * b_.frame->face_normals[c.face];
     }
     const bool outside =
-        pseudonormal.dot(way) >= 0.0 || (search_.self == PairSearch::Self::kNo && windingAround(p) <= 0);
+        pseudonormal.dot(way) >= 0.0 || (search_.self == PairSearch::Self::kNo && windingAround(point.place) <= 0);
     return outside ? best.distance : -best.distance;
   }
 
@@ -330,12 +345,13 @@ class PointSearch {
     }
     if (point.isVertex()) rememberOutside(point.vertices[0], p, best);
     if (!b_.surface->closed) return;
-    for (const NearFace& c : candidates_) {
+    for (NearFace& c : candidates_) {
       if (made_ == used_.size()) break;
       if (&c == &best || c.corners != 3 || c.distance > c.reach) continue;
       const Vec3& normal = b_.frame->face_normals[c.face];
       if (normal.dot(p - c.point) < 0.0 || !mayPush(point, normal)) continue;
-      if (std::any_of(used_.begin(), used_.begin() + made_, [&](const Vec3& u) { return u.dot(normal) > kSameWay; }))
+      if (std::any_of(used_.begin(), used_.begin() + made_, [&](const Vec3& u) { return u.dot(normal) > kSameWay; }) ||
+          !hasTissueBehind(point, c))
         continue;
       add(point, c, normal, c.distance);
     }
@@ -356,7 +372,7 @@ class PointSearch {
     const Vec3& p = point.place;
     const NearFace* out = nullptr;
     double least = std::numeric_limits<double>::infinity(), gap = 0.0;
-    for (const NearFace& c : candidates_) {
+    for (NearFace& c : candidates_) {
       const Vec3& normal = b_.frame->face_normals[c.face];
       const double height = normal.dot(p - c.point);
       if (height > 0.0 || (c.corners != 3 && -height < 0.5 * c.distance)) continue;
@@ -365,7 +381,7 @@ class PointSearch {
       if (!(opposed > kLeastOpposed || same > kSameWay)) continue;
       double cost = c.distance / std::max(kLeastOpposed, opposed * opposed);
       if (remembered_) cost /= kLeastOpposed + std::max(0.0, same) * same;
-      if (!(cost < least)) continue;
+      if (!(cost < least) || !hasTissueBehind(point, c)) continue;
       least = cost;
       out = &c;
       gap = c.corners == 3 ? height : -c.distance;
@@ -401,7 +417,7 @@ class PointSearch {
   std::vector<FeaturePair>& pairs_;
   std::vector<RememberedSide>& sides_;
   SearchScratch& scratch_;
-  SearchScratch::Behind behind_point_ = SearchScratch::Behind::kUnknown;
+  Layers behind_point_ = Layers::kUnknown;
   std::vector<NearFace>& candidates_;
   const RememberedSide* remembered_ = nullptr;
   std::size_t made_ = 0, queried_ = 0;
@@ -451,8 +467,7 @@ void findNear(const PairSearch& search, SearchScratch& scratch) {
 
 std::size_t findVertexFace(const PairSearch& search, SearchScratch& scratch) {
   findNear(search, scratch);
-  if (search.self != PairSearch::Self::kNo)
-    scratch.behind.assign(search.b.surface->triangles.size(), SearchScratch::Behind::kUnknown);
+  if (search.self != PairSearch::Self::kNo) scratch.behind.assign(search.b.surface->triangles.size(), Layers::kUnknown);
   PointSearch each(search, scratch);
   each.findVertices();
   if (search.self != PairSearch::Self::kNo) return each.queried();

@@ -193,8 +193,9 @@ class Solver {
     push(bodies_[active.b], active.on_b, impulse);
   }
 
-  /// The last impulses, as far as they press along the normal of now: between bodies, where those of one hold up
-  /// another, then of bodies with themselves.
+  /// The last impulses, as far as they press along the normal of now. Of rows of a body with itself what of them leaves
+  /// the least energy: shreds in a tangle go many times as far as their rows are long, and sweeps would not take back
+  /// what rows that come and go give them.
   void warmStart(double share) {
     for (const Active& active : scratch_.active) {
       ContactRow& row = *active.row;
@@ -203,32 +204,32 @@ class Solver {
       else
         row.impulse *= share;
     }
-    for (const bool within : {false, true}) warmStart(within);
+    const Active *const all = scratch_.active.data(), *const last = all + scratch_.active.size();
+    for (const Active *begin = all, *end = all; begin != last; begin = end) {
+      while (end != last && end->rows == begin->rows) ++end;
+      warmStart(begin, end, begin->rows->a == begin->rows->b);
+    }
   }
 
-  /// Where all of them would leave more energy than none, the share of them that leaves least: shreds in a tangle go
-  /// many times as far as their rows are long, and sweeps would not take back what rows that come and go give them.
-  void warmStart(bool within) {
-    const auto each = [&](const auto& visit) {
-      for (const Active& active : scratch_.active)
-        if ((active.rows->a == active.rows->b) == within && !active.row->impulse.isZero(0.0)) visit(active);
-    };
+  void warmStart(const Active* begin, const Active* end, bool within) {
     const auto worked = [&] {  // [kg m^2]
       double sum = 0.0;
-      each([&](const Active& active) { sum += active.row->impulse.dot(beyond(active)); });
+      for (const Active* active = begin; active != end; ++active)
+        if (!active->row->impulse.isZero(0.0)) sum += active->row->impulse.dot(beyond(*active));
       return sum;
     };
-    const auto give = [&](double more) {
-      each([&](const Active& active) { push(active, more * active.row->impulse); });
+    const auto give = [&](double share) {
+      for (const Active* active = begin; active != end; ++active)
+        if (!active->row->impulse.isZero(0.0)) push(*active, share * active->row->impulse);
     };
-    const double before = worked();
+    const double before = within ? worked() : 0.0;
     give(1.0);
-    const double after = worked();
+    const double after = within ? worked() : 0.0;
+    if (!(after > 0.0)) return;
     // A share s of them gives h^-2 (s before + s^2 (after - before) / 2).
-    if (!(before + after > 0.0)) return;
     const double best = std::max(0.0, -before / (after - before));
     give(best - 1.0);
-    each([&](const Active& active) { active.row->impulse *= best; });
+    for (const Active* active = begin; active != end; ++active) active->row->impulse *= best;
   }
 
   /// [m] how far a row is from what it asks for: along the normal the target, across it the start.
@@ -531,8 +532,6 @@ inline void solve(const std::vector<SolverRows>& sets, std::vector<SpringRow>& s
   counters.fibres += fibres.size();
   counters.active += scratch.active.size();
   for (const auto& active : scratch.active) counters.ground += active.row->kind == FeaturePair::Kind::kPlane;
-  // Springs first: what they draw is what rows hold against.
-  for (std::size_t n = 0; n < springs.size(); ++n) solver.visit(springs[n], scratch.pulls[n], step.h);
   solver.warmStart(step.warm);
   // Contacts have the last word. Always in the same order: in turns, what the last impulses leave over changes from
   // substep to substep, and stacks of stiff bodies sway.

@@ -239,10 +239,10 @@ TEST(Contact, CollidingBodiesKeepTheirMomentumAndLoseEnergy) {
         EXPECT_LE(energy(world, 0.0), kinetic * (1.0 + 1e-6));
       }
       EXPECT_GT(contacts, 0u);
-      EXPECT_LE((momentum(world) - before).norm(), mass * (3e-9 * size + 1.6e-12 * far.norm())) << size;
+      EXPECT_LE((momentum(world) - before).norm(), mass * (3e-9 * size + 8e-13 * far.norm())) << size;
       const double lever = size + far.norm();
       EXPECT_LE((angularMomentum(world) - turning).norm(),
-                0.02 * mass * size * size + mass * lever * (3e-9 * size + 1.6e-12 * far.norm()))
+                0.02 * mass * size * size + mass * lever * (3e-9 * size + 8e-13 * far.norm()))
           << size << " m, before " << turning.transpose() << ", after " << angularMomentum(world).transpose();
       const WorldSnapshot shot = seen(world);
       EXPECT_LE(inside(shot.bodies[0], shot.bodies[1]).second, 0.01 * size);

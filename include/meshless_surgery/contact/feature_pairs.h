@@ -30,12 +30,15 @@ struct RememberedSide {
   Vec3 normal = Vec3::UnitZ();
 };
 
+enum class Layers : std::uint8_t { kUnknown, kNone, kOne, kMore };  // of tissue
+
 /// A face near a vertex.
 struct NearFace {
   Index face = 0;
   Vec3 weights, point;
   double distance = 0.0, reach = 0.0;
   int corners = 0;  // of the face that the nearest point lies between: 1 at a vertex, 2 on an edge, 3 inside
+  Layers behind = Layers::kUnknown;  // it and the point that it is near to, beyond what overlaps: kOne, or kNone
 };
 
 /// What a search finds, and its scratch.
@@ -49,8 +52,7 @@ struct SearchScratch {
   std::vector<Met> met;      // faces that vertices may meet
   std::vector<Index> first;  // one a vertex: of met; kNoIndex: none
   std::vector<std::array<Index, 2>> stack;
-  enum class Behind : std::uint8_t { kUnknown, kTissue, kNone };
-  std::vector<Behind> behind;  // one a face of a surface that meets itself
+  std::vector<Layers> behind;  // one a face of a surface that meets itself
 };
 
 struct PairSearch {
