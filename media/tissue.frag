@@ -23,6 +23,7 @@ varying vec3 at;
 varying vec3 place;
 varying vec3 turned;
 varying float growth;
+varying float pressed;
 varying float from_rim;
 
 const float PERIOD = 289.0;
@@ -177,7 +178,7 @@ void main()
 #endif
 
   // Stretched or pressed in, tissue holds less blood.
-  float blanched = 0.5 * smoothstep(1.15, 2.0, growth);
+  float blanched = max(0.5 * smoothstep(1.15, 2.0, growth), 0.8 * pressed);
   colour = mix(colour, vec3(0.55, 0.48, 0.44) + 0.45 * colour, blanched);
 
   float facing = max(dot(n, eye), 0.0), raised = dot(n, up);

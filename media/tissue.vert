@@ -13,6 +13,7 @@ varying vec3 at;       // [m] in the world
 varying vec3 place;    // [m] of the body at rest
 varying vec3 turned;   // its normal there
 varying float growth;  // area over area at rest
+varying float pressed; // 0 .. 1: how far blood is pressed out of it
 varying float from_rim; // [m] to where a cut meets the outer surface
 
 void main()
@@ -25,6 +26,7 @@ void main()
   place = gl_MultiTexCoord0.xyz;
   turned = gl_MultiTexCoord2.xyz;
   growth = gl_MultiTexCoord1.x;
+  pressed = gl_MultiTexCoord1.y;
   from_rim = gl_MultiTexCoord2.w;
   gl_FrontColor = gl_Color;
 }

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
+#include <tuple>
 
 #include "meshless_surgery/geometry/query/nearest_on_triangle.h"
 
@@ -119,8 +121,11 @@ class PointSearch {
       if (scratch_.first[v] == kNoIndex && !inside && !mayBeginInside(a_.frame->vertices[v])) continue;
       if (search_.self == PairSearch::Self::kCuts && !a_.surface->cut_vertices[v]) continue;
       const SurfacePoint point = vertexOf(a_, v);
-      behind_point_ = Layers::kUnknown;
       candidates_.clear();
+      if (meetsItself()) {
+        behind_point_ = layersAt(point.place - margin_ * point.normal);
+        if (behind_point_ == Layers::kNone) continue;
+      }
       if (inside)
         gather(point, margin_ + remembered_->depth);
       else
@@ -189,36 +194,41 @@ class PointSearch {
     return b_.frame->face_normals[face].dot(point.normal) < -kSelfOpposed;
   }
 
-  // A surface meets itself where, beyond what overlaps, one layer of tissue is behind the point and one behind the
-  // face. Elsewhere it is turned inside out, or has gone through itself, and a row would keep it so. In a crumple each
-  // point has hundreds of candidates, and this costs a hundred times what the rest of one does: ask it last.
-  bool hasTissueBehind(const SurfacePoint& point, NearFace& c) {
-    if (search_.self == PairSearch::Self::kNo || !b_.surface->closed) return true;
+  bool meetsItself() const { return search_.self != PairSearch::Self::kNo && b_.surface->closed; }
+
+  // A surface meets itself where there is tissue behind the point and the face: beyond what overlaps, one layer of it.
+  // Elsewhere it is turned inside out, or has gone through itself, and a row would keep it so. In a crumple each point
+  // has hundreds of candidates, and what overlaps costs a hundred times what the rest of one does: it is asked last.
+  bool hasTissueBehind(const SurfacePoint& point, NearFace& c) const {
+    if (!meetsItself()) return true;
     if (c.behind == Layers::kUnknown) c.behind = findBehind(point, c) ? Layers::kOne : Layers::kNone;
     return c.behind == Layers::kOne;
   }
 
-  bool findBehind(const SurfacePoint& point, const NearFace& c) {
+  bool findBehind(const SurfacePoint& point, const NearFace& c) const {
     const Vec3& normal = b_.frame->face_normals[c.face];
-    const Triangle& t = b_.surface->triangles[c.face];
-    const Points& x = b_.frame->vertices;
-    const Vec3 middle = (x[t[0]] + x[t[1]] + x[t[2]]) / 3.0;  // ends of a face may lie on a rim
     const double deep = normal.dot(c.point - point.place);
-    // The point is asked once for all faces, and the face once for all points.
-    const Layers of_point = layersAt(behind_point_, point.place - margin_ * point.normal);
-    if (of_point == Layers::kNone) return false;
-    const Layers of_face = layersAt(scratch_.behind[c.face], middle - margin_ * normal);
-    if (!(deep > 0.0)) return of_point == Layers::kOne && of_face == Layers::kOne;
-    return of_face != Layers::kNone && windingAround(middle - (deep + margin_) * normal) == 1 &&
+    if (!(deep > 0.0)) return behind_point_ == Layers::kOne && scratch_.behind[c.face] == Layers::kOne;
+    return windingAround(middleOf(c.face) - (deep + margin_) * normal) == 1 &&
            windingAround(point.place + deep * normal - margin_ * point.normal) == 1;
   }
 
-  Layers layersAt(Layers& known, const Vec3& at) const {
-    if (known == Layers::kUnknown) {
-      const int winding = windingAround(at);
-      known = winding < 1 ? Layers::kNone : winding == 1 ? Layers::kOne : Layers::kMore;
-    }
+  Vec3 middleOf(Index face) const {  // its ends may lie on a rim
+    const Triangle& t = b_.surface->triangles[face];
+    const Points& x = b_.frame->vertices;
+    return (x[t[0]] + x[t[1]] + x[t[2]]) / 3.0;
+  }
+
+  /// Asked once a face for all points.
+  Layers layersBehind(Index face) {
+    Layers& known = scratch_.behind[face];
+    if (known == Layers::kUnknown) known = layersAt(middleOf(face) - margin_ * b_.frame->face_normals[face]);
     return known;
+  }
+
+  Layers layersAt(const Vec3& at) const {
+    const int winding = windingAround(at);
+    return winding < 1 ? Layers::kNone : winding == 1 ? Layers::kOne : Layers::kMore;
   }
 
   void gather(const SurfacePoint& point, double within) {
@@ -240,7 +250,7 @@ class PointSearch {
     c.distance = way.norm();
     const double towards = std::max({way.dot(u[t[0]]), way.dot(u[t[1]]), way.dot(u[t[2]])}) - way.dot(point.velocity);
     c.reach = c.distance > 0.0 ? search_.h * std::max(0.0, towards / c.distance) : 0.0;
-    if (c.distance > within + c.reach) return;
+    if (c.distance > within + c.reach || (meetsItself() && layersBehind(face) == Layers::kNone)) return;
     c.reach += margin_;
     c.corners = static_cast<int>((c.weights.array() > 0.0).count());
     candidates_.push_back(c);
@@ -248,12 +258,18 @@ class PointSearch {
 
   /// Of those with tissue behind them; null: there are none.
   NearFace* chooseNearest(const SurfacePoint& point) {
-    NearFace* nearest;
-    do {
-      nearest = nullptr;
-      for (NearFace& c : candidates_)
-        if (c.behind != Layers::kNone && (!nearest || c.distance < nearest->distance)) nearest = &c;
-    } while (nearest && !hasTissueBehind(point, *nearest));
+    const auto farther = [this](Index x, Index y) {
+      return std::tie(candidates_[x].distance, x) > std::tie(candidates_[y].distance, y);
+    };
+    std::vector<Index>& order = scratch_.order;
+    order.resize(candidates_.size());
+    std::iota(order.begin(), order.end(), 0);
+    std::make_heap(order.begin(), order.end(), farther);
+    while (!order.empty() && !hasTissueBehind(point, candidates_[order.front()])) {
+      std::pop_heap(order.begin(), order.end(), farther);
+      order.pop_back();
+    }
+    NearFace* const nearest = order.empty() ? nullptr : &candidates_[order.front()];
     if (!nearest || nearest->distance > tie_) return nearest;  // signs hold at the nearest point alone
     NearFace* best = nearest;
     double most = -3.0;

@@ -212,7 +212,7 @@ void Publishers::publishTick(Clock::time_point now) {
   wants.surfaces = markers || surfaces || vertices;
   wants.particles = points || clusters || collision;
   wants.measures = state;
-  wants.contacts = contacts || forces;
+  wants.contacts = contacts || forces || surfaces;
   // The stamp comes first: who sees one later than an answer sees what was answered.
   std_msgs::Header header;
   header.stamp = ros::Time::now();

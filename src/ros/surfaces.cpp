@@ -3,17 +3,19 @@
 #include <cmath>
 
 #include "convert.h"
+#include "meshless_surgery/world/contact_pressure.h"
 
 namespace meshless {
 namespace {
 
-meshless_surgery::Surface toSurface(const BodySnapshot& body, bool strain) {
+meshless_surgery::Surface toSurface(const WorldSnapshot& snapshot, const BodySnapshot& body, bool strain) {
   auto message = toSurfaceOf<meshless_surgery::Surface>(body);
   message.vertices.reserve(3 * body.surface.size());
   for (const Vec3& v : body.surface)
     for (int axis = 0; axis < 3; ++axis) message.vertices.push_back(static_cast<float>(v[axis]));
   const TriangleMesh& rest = body.model->surface;
   if (strain) message.strain = surfaceStrain(rest.vertices, body.surface, rest.triangles);
+  message.pressure = contactPressure(snapshot, body);
   return message;
 }
 
@@ -44,7 +46,7 @@ meshless_surgery::Surfaces toSurfaces(const WorldSnapshot& snapshot, const std_m
   meshless_surgery::Surfaces message = toolsIn(snapshot);
   message.header = header;
   message.bodies.reserve(snapshot.bodies.size());
-  for (const BodySnapshot& body : snapshot.bodies) message.bodies.push_back(toSurface(body, strain));
+  for (const BodySnapshot& body : snapshot.bodies) message.bodies.push_back(toSurface(snapshot, body, strain));
   return message;
 }
 

@@ -31,6 +31,7 @@ constexpr float kLamp = 0.85f;  // share of the colour that the lamp adds
 constexpr double kSeenThrough = 0.6;  // opacity up to which what is inside of a body shows, whatever is drawn first
 constexpr float kDry = 0.1f;          // wetness of what is shown by strain
 constexpr float kFarFromRim = 0.02f;  // [m] beyond what the shader asks for, in large triangles too
+constexpr float kVenous = 1600.0f, kArterial = 4300.0f;  // [Pa] in capillaries
 constexpr std::uint32_t kNoCorner = std::numeric_limits<std::uint32_t>::max();
 
 Ogre::ColourValue toColour(const std_msgs::ColorRGBA& c) { return Ogre::ColourValue(c.r, c.g, c.b, c.a); }
@@ -219,11 +220,11 @@ void BodyShape::makeBuffers() {
   Ogre::VertexDeclaration* layout = data_->vertexDeclaration;
   layout->addElement(0, 0, Ogre::VET_FLOAT3, Ogre::VES_POSITION);
   layout->addElement(0, 3 * sizeof(float), Ogre::VET_FLOAT3, Ogre::VES_NORMAL);
-  layout->addElement(0, 6 * sizeof(float), Ogre::VET_FLOAT1, Ogre::VES_TEXTURE_COORDINATES, 1);
+  layout->addElement(0, 6 * sizeof(float), Ogre::VET_FLOAT2, Ogre::VES_TEXTURE_COORDINATES, 1);
   layout->addElement(1, 0, Ogre::VET_UBYTE4_NORM, Ogre::VES_DIFFUSE);
   layout->addElement(2, 0, Ogre::VET_FLOAT3, Ogre::VES_TEXTURE_COORDINATES, 0);
   layout->addElement(2, 3 * sizeof(float), Ogre::VET_FLOAT4, Ogre::VES_TEXTURE_COORDINATES, 2);
-  places_ = manager.createVertexBuffer(7 * sizeof(float), corners_.size(),
+  places_ = manager.createVertexBuffer(8 * sizeof(float), corners_.size(),
                                        Ogre::HardwareBuffer::HBU_DYNAMIC_WRITE_ONLY_DISCARDABLE);
   colours_ = manager.createVertexBuffer(4, corners_.size(), Ogre::HardwareBuffer::HBU_DYNAMIC_WRITE_ONLY);
   rests_ = manager.createVertexBuffer(7 * sizeof(float), corners_.size(), Ogre::HardwareBuffer::HBU_STATIC_WRITE_ONLY);
@@ -372,7 +373,7 @@ void BodyShape::shade(const ShadowTips& tips) {
 }
 
 void BodyShape::place() {
-  floats_.resize(7 * corners_.size());
+  floats_.resize(8 * corners_.size());
   Ogre::AxisAlignedBox box;
   float* to = floats_.data();
   for (std::size_t c = 0; c < corners_.size(); ++c) {
@@ -388,6 +389,7 @@ void BodyShape::place() {
     for (const Ogre::Vector3& v : {at, normal})
       for (int axis = 0; axis < 3; ++axis) *to++ = v[axis];
     *to++ = rest_areas_.empty() ? 1.0f : area / rest_areas_[c];
+    *to++ = pale_.empty() ? 0.0f : pale_[corners_[c].vertex];
   }
   places_->writeData(0, floats_.size() * sizeof(float), floats_.data(), true);
   for (const auto& part : parts_)
@@ -426,7 +428,8 @@ void BodyShape::show(const meshless_surgery::Surface& surface, const meshless_su
     color_ = surface.color;
     inside_color_ = surface.inside_color;
   }
-  if (same && surface.vertices != to_) {
+  const bool pressed = pressedBy(surface);
+  if (same && (pressed || surface.vertices != to_)) {
     from_ = at_;
     to_ = surface.vertices;
     moving_ = true;
@@ -435,6 +438,18 @@ void BodyShape::show(const meshless_surgery::Surface& surface, const meshless_su
     move(1.0f);
   else if (!same || new_look)
     place();
+}
+
+/// Whether that has changed. Between the pressures at the two ends of capillaries, 12 and 32 mmHg, blood is pressed out
+/// of tissue (Landis 1930).
+bool BodyShape::pressedBy(const meshless_surgery::Surface& surface) {
+  std::vector<float> pale;
+  if (surface.pressure.size() == surface.vertices.size() / 3)
+    for (const float pressure : surface.pressure)
+      pale.push_back(std::clamp((pressure - kVenous) / (kArterial - kVenous), 0.0f, 1.0f));
+  const bool changed = pale != pale_;
+  pale_.swap(pale);
+  return changed;
 }
 
 void BodyShape::move(float share) {

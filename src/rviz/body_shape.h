@@ -83,6 +83,7 @@ class BodyShape {
   void setMaterials(const meshless_surgery::Surface& surface, const meshless_surgery::BodyTopology* patterns,
                     const TissueTextures& textures, const BodyLook& look);
   void place();
+  bool pressedBy(const meshless_surgery::Surface& surface);
 
   Ogre::SceneManager* scene_manager_;
   Ogre::SceneNode* node_;
@@ -106,6 +107,7 @@ class BodyShape {
   std_msgs::ColorRGBA color_, inside_color_;
   // and where: three numbers a vertex
   std::vector<float> at_, from_, to_;
+  std::vector<float> pale_;  // one a vertex: 0 .. 1; empty: nothing presses
   bool moving_ = false;
   // kept, so that a frame allocates nothing
   std::vector<Ogre::Vector3> faces_;  // normals, as long as twice the area

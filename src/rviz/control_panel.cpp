@@ -20,17 +20,19 @@
 #include <QVBoxLayout>
 #include <pluginlib/class_list_macros.hpp>
 
+#include "hand_bars.h"
 #include "step_plot.h"
 #include "task_text.h"
 
 namespace meshless {
 namespace {
 
-constexpr int kRefresh = 200;           // [ms]
-constexpr int kTicks = 1000;            // of a slider
-constexpr double kMostDamping = 100.0;  // [1/s] of the slider
+constexpr int kRefresh = 200;                         // [ms]
+constexpr int kTicks = 1000;                          // of a slider
+constexpr double kMostDamping = 100.0;                // [1/s] of the slider
 constexpr double kSoftest = 100.0, kHardest = 1.0e6;  // [Pa] of the slider
 constexpr double kMostPoisson = 0.49;
+constexpr double kFullForce = 5.0;  // [N] that fills a bar where no task says what is too much
 constexpr double kUserHolds = 1.0;  // [s] that a slider stays where the user put it, before the node's value is shown
 
 enum Column { kName, kVolume, kParticles, kAsleep, kColumns };
@@ -112,6 +114,8 @@ ControlPanel::ControlPanel(QWidget* parent) : rviz::Panel(parent), link_(new Nod
   layout->addWidget(time_);
   plot_ = new StepPlot(this);
   layout->addWidget(plot_);
+  hands_ = new HandBars(this);
+  layout->addWidget(hands_);
 
   bodies_ = new QTableWidget(0, kColumns, this);
   bodies_->setHorizontalHeaderLabels({"Body", "Volume [ml]", "Particles", "Asleep"});
@@ -250,6 +254,7 @@ void ControlPanel::changeNode() {
   task_->hide();
   task_now_.reset();
   bodies_->setRowCount(0);
+  hands_->show({}, kFullForce);
   time_->setText("no state from the node yet");
   if (isVisible()) listen();
   Q_EMIT configChanged();
@@ -274,6 +279,8 @@ void ControlPanel::refresh() {
           .arg(state_->paused ? QString("paused") : QString("speed %1").arg(state_->real_time_factor, 0, 'f', 2))
           .arg(1e3 * state_->mean_step, 0, 'f', 2)
           .arg(1e3 * state_->worst_step, 0, 'f', 1));
+  const bool limited = task_now_ && task_now_->running && task_now_->force_limit > 0.0;
+  hands_->show(handForces(*state_), limited ? task_now_->force_limit : kFullForce);
   fillBodies();
   fillMaterial();
 }

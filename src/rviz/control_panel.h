@@ -21,6 +21,7 @@ class QTimer;
 
 namespace meshless {
 
+class HandBars;
 class StepPlot;
 
 class ControlPanel : public rviz::Panel {
@@ -82,6 +83,7 @@ class ControlPanel : public rviz::Panel {
   QLabel* time_;
   QLabel* task_;
   StepPlot* plot_;
+  HandBars* hands_;
   QTableWidget* bodies_;
   QGroupBox* material_;
   QFormLayout* form_;

@@ -303,6 +303,19 @@ class MessagesLawTest(DeformerTestCase):
             numpy.testing.assert_allclose(force, [0.0, 0.0, weight], atol=0.02 * weight)  # it still settles
         held.update((message.contacts[0]._type, field) for field in ('body', 'other', 'position', 'normal', 'force'))
 
+    def pressed_by_the_sphere(self, surface, places, triangles):
+        contacts = [c for c in self.fresh('contact_forces', ContactForces).contacts if (c.body, c.other) == (surface.name, 'push')]
+        force = sum(numpy.dot(plain(c.normal), plain(c.force)) for c in contacts)
+        self.assertEqual(len(places) if force > 0.0 else 0, len(surface.pressure), surface.name)
+        if not force > 0.0:
+            return
+        areas = numpy.zeros(len(places))
+        a, b, c = (places[triangles[:, k]] for k in range(3))
+        for k in range(3):
+            numpy.add.at(areas, triangles[:, k], numpy.linalg.norm(numpy.cross(b - a, c - a), axis=1) / 6.0)
+        numpy.testing.assert_allclose(force, numpy.dot(surface.pressure, areas), rtol=1e-3)
+        held.add((surface._type, 'pressure'))
+
     def test_contacts_carry_weights_out_of_what_is_below(self):
         weight = MASSES['flat'] * G
         self.assertAlmostEqual(weight, self.carried(), delta=0.002 * weight)
@@ -518,6 +531,7 @@ class MessagesLawTest(DeformerTestCase):
             low, side = places.min(0), (places.max(0) - places.min(0)).max()
             self.says(coarse, id=still.id, origin=(low, 1e-9), step=(side / 65535.0, 1e-12))
             self.holds(coarse, 'xyz', numpy.rint((places - low) / side * 65535.0).ravel(), 1.0)
+            self.pressed_by_the_sphere(surface, places, triangles)
         self.assertEqual(len(topology.bodies), len(vertices.bodies))
         held.update((m._type, 'bodies') for m in (topology, vertices))
         self.says(vertices, complete=True, topology=topology.topology, run=topology.run)

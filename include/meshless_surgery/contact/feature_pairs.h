@@ -46,6 +46,7 @@ struct SearchScratch {
   std::vector<FeaturePair> pairs;
   std::vector<RememberedSide> sides;  // to be remembered
   std::vector<NearFace> faces;        // of one vertex
+  std::vector<Index> order;           // of these
   struct Met {
     Index face, next;  // in the list, of the same vertex
   };
